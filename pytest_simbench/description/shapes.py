@@ -22,6 +22,9 @@ _GRID = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 DIRECTIONS: FloatArray = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
 """The 26 directions to faces, edges and corners of a cube, unit vectors, (26, 3)."""
 
+NO_REACH: FloatArray = np.full(len(DIRECTIONS), np.nan)
+"""Of what an engine has and no scene, (26,)."""
+
 OUTLINES = ("boxes", "meshes", "rounds")
 """The quantities of a body or link that `outlines` makes."""
 
@@ -58,27 +61,31 @@ def cylinder_reach(radius: float, length: float, pose: Pose | None = None) -> Fl
     return np.asarray(DIRECTIONS @ np.asarray(pose.position) + reached)
 
 
+def box_reach(size: Sequence[float] | FloatArray, pose: Pose) -> FloatArray:
+    """The `reach` of a box of edge lengths `size` [m] whose centre is at a pose, (26,) [m]."""
+    return reach(placed(box_corners(size), pose))
+
+
 def outlines(
-    prefix: str,
-    boxes: Iterable[FloatArray],
-    meshes: Iterable[FloatArray],
-    rounds: Iterable[FloatArray] = (),
+    shapes: Iterable[tuple[str, FloatArray]], asked: Sequence[FloatArray] | None = None
 ) -> dict[str, FloatArray]:
-    """The quantities `boxes`, `meshes` and `rounds` of a body or link named `prefix`: of each kind
-    the shapes' reaches in an order of their own, (n_shapes, 26) [m]."""
-    found = {}
-    for kind, reaches in zip(OUTLINES, (boxes, meshes, rounds), strict=True):
-        rows = np.array(list(reaches), dtype=float).reshape(-1, len(DIRECTIONS))
-        found[f"{prefix}/{kind}"] = np.asarray(rows[order_of(rows)])
-    return found
+    """The quantities `boxes`, `meshes` and `rounds` of a body or link.
 
+    Args:
+        shapes: each by its kind, one of `OUTLINES`, and its `reach`.
+        asked: reaches of the same shapes to order them by, from whoever measures them with an error
+            that may change the order.
 
-def order_of(reaches: Sequence[FloatArray] | FloatArray) -> list[int]:
-    """The order that `outlines` puts shapes in, by their numbers. Who measures with an error that
-    may change it orders by what the scene has."""
-    rows = np.reshape(reaches, (-1, len(DIRECTIONS)))
-    found: list[int] = np.argsort(rows @ _ORDER).tolist()
-    return found
+    Returns:
+        Of each kind the reaches in an order of their own, (n_shapes, 26) [m].
+    """
+    found, count = list(shapes), len(DIRECTIONS)
+    reaches = [reached for _, reached in found]
+    order = np.argsort(np.reshape(reaches if asked is None else asked, (-1, count)) @ _ORDER)
+    return {
+        kind: np.reshape([reaches[k] for k in order if found[k][0] == kind], (-1, count))
+        for kind in OUTLINES
+    }
 
 
 def box_corners(size: Sequence[float] | FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ as visual shapes too.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ import numpy as np
 
 from pytest_simbench.description.urdf_check import Description
 from pytest_simbench.ground.errors import DescriptionError
-from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
+from pytest_simbench.scene import Body, ConvexMesh, FloatArray, Polytope, Pose, Robot, Vector3
 from pytest_simbench.scene.pose import vector3
 from pytest_simbench.scene.wire import Wire
 
@@ -182,24 +182,60 @@ class PreparedRobot:
                 link.shapes.append(Shape(origin_of(collision), mesh=path))
         return link
 
-    def to_urdf(self) -> str:
-        """The reduced robot as URDF text."""
+    def to_urdf(self, *, mimic: bool = False, visuals: bool = True) -> str:
+        """The reduced robot as URDF text.
+
+        Args:
+            mimic: say that the other fingers follow the first.
+            visuals: draw each collision shape.
+        """
         root = ET.Element("robot", name=self.robot.name)
         for link in self.links.values():
-            write_link(root, link)
+            write_link(root, link, visuals)
         for joint in self.joints:
             drive = self.robot.joints[self.robot.joint_names.index(joint.name)]
             fastest = self.velocity_limits[joint.name]
-            write_joint(root, joint, self.limits[joint.name], drive.effort_limit, fastest)
+            element = write_joint(root, joint, self.limits[joint.name], drive.effort_limit, fastest)
+            fingers = self.robot.gripper.joints
+            if mimic and joint.name in fingers[1:]:
+                ET.SubElement(element, "mimic", joint=fingers[0], multiplier="1", offset="0")
         # One engine reads files in pieces of 1024 bytes a line and may cut an attribute in two.
         ET.indent(root)
         return ET.tostring(root, encoding="unicode")
 
-    def write_urdf(self, directory: str | Path) -> Path:
-        """Write the reduced robot into a file of `directory`, for engines that read only files."""
+    def write_urdf(self, directory: str | Path, **options: bool) -> Path:
+        """Write the reduced robot into a file of `directory`, for engines that read only files; the
+        options are those of `to_urdf`."""
         path = Path(directory) / f"{self.robot.name}.urdf"
-        path.write_text(self.to_urdf(), encoding="utf-8")
+        path.write_text(self.to_urdf(**options), encoding="utf-8")
         return path
+
+
+def body_urdf(body: Body, mesh: Callable[[str, Polytope], Path]) -> str:
+    """A body as URDF text, its frame the one link's: for engines that take moments of inertia, many
+    shapes or a mesh from there alone.
+
+    Args:
+        body: a free one, or a fixed one, which has no mass there.
+        mesh: writes the hull of a mesh, given a name for it; the file.
+    """
+    root = ET.Element("robot", name="body")  # names of the scene may hold what an engine's may not
+    link = ET.SubElement(root, "link", name="body")
+    if body.mass:
+        _write_inertial(link, Link("body", body.mass, inertia=np.diag(body.inertia())))
+    for k, part in enumerate(body.parts):
+        if isinstance(part, ConvexMesh):
+            kind, written = "mesh", {"filename": str(mesh(str(k), part.hull))}
+        else:
+            size = {n: getattr(part, n) for n in ("size", "radius", "length") if hasattr(part, n)}
+            kind = part.kind
+            written = {name: _spaced(np.atleast_1d(value)) for name, value in size.items()}
+        for tag in ("visual", "collision"):
+            element = ET.SubElement(link, tag)
+            write_origin(element, part.pose)
+            ET.SubElement(ET.SubElement(element, "geometry"), kind, written)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode")
 
 
 def _about(inertia: FloatArray, mass: float, offset: FloatArray) -> FloatArray:
@@ -259,19 +295,19 @@ def write_origin(element: ET.Element, pose: Pose) -> None:
     ET.SubElement(element, "origin", xyz=_spaced(pose.position), rpy=_spaced((roll, pitch, yaw)))
 
 
-def write_link(root: ET.Element, link: Link) -> None:
-    """Add a link, its collision shapes as visual ones too."""
+def write_link(root: ET.Element, link: Link, visuals: bool = True) -> None:
+    """Add a link, its collision shapes as visual ones too where it is asked for."""
     element = ET.SubElement(root, "link", name=link.name)
     if link.mass > 0:
         _write_inertial(element, link)
     for shape in link.shapes:
-        for tag in ("visual", "collision"):
+        for tag in ("visual", "collision") if visuals else ("collision",):
             _write_shape(ET.SubElement(element, tag), shape)
 
 
 def write_joint(
     root: ET.Element, joint: MovingJoint, limits: Iterable[float], effort: float, fastest: float
-) -> None:
+) -> ET.Element:
     """Add a joint, its limits [rad or m], largest effort [N m or N] and speed [rad/s or m/s]."""
     element = ET.SubElement(root, "joint", name=joint.name, type=joint.kind)
     write_origin(element, joint.origin)
@@ -282,6 +318,7 @@ def write_joint(
     ET.SubElement(
         element, "limit", lower=lower, upper=upper, effort=repr(effort), velocity=repr(fastest)
     )
+    return element
 
 
 def _write_inertial(element: ET.Element, link: Link) -> None:

@@ -50,7 +50,7 @@ import numpy as np
 from pytest_simbench.description.links import link_poses, links_collide, motion_subspace, reduced
 from pytest_simbench.description.shapes import DIRECTIONS, outlines, reach, shape_points
 from pytest_simbench.description.urdf import ROOT, PreparedRobot
-from pytest_simbench.scene import Box, ConvexMesh, FloatArray, Robot, Scene
+from pytest_simbench.scene import Body, Box, ConvexMesh, FloatArray, Robot, Scene
 from pytest_simbench.simulator.settings import Settings
 
 MOVING = ("pose", "velocity", "initial_position")
@@ -68,7 +68,7 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
         "ground/restitution": scene.ground_restitution,
     }
     for body in scene.bodies:
-        quantities |= _named(
+        quantities |= named(
             f"body/{body.name}",
             pose=body.pose.as_array(),
             friction=body.friction,
@@ -76,11 +76,8 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
             margin=0.0,
             dynamic=float(body.mass > 0),
         )
-        kinds: tuple[list[FloatArray], ...] = ([], [], [])
-        flat = {Box.kind: 0, ConvexMesh.kind: 1}
-        for part in body.parts:
-            kinds[flat.get(part.kind, 2)].append(part.reach_placed(DIRECTIONS))
-        quantities |= outlines(f"body/{body.name}", *kinds)
+        shapes = ((kind_of(part), part.reach_placed(DIRECTIONS)) for part in body.parts)
+        quantities |= named(f"body/{body.name}", **outlines(shapes))
         if body.mass:
             inertia = np.diag(body.inertia())
             quantities |= _inertial(f"body/{body.name}", body.mass, np.zeros(3), inertia)
@@ -91,8 +88,8 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
     quantities |= touches(scene, prepared, lambda a, b: _collide(prepared, a, b))
     own = {f"body/{body.name}/damping" for body in scene.free_bodies if body.damping.any()}
     for pattern, value in settings.quantities().items():
-        named = {name for name in quantities if fnmatchcase(name, pattern)}
-        quantities |= dict.fromkeys(named - own, value)
+        meant = {name for name in quantities if fnmatchcase(name, pattern)}
+        quantities |= dict.fromkeys(meant - own, value)
     return quantities
 
 
@@ -105,19 +102,25 @@ def constants(names: Iterable[str], scene: Scene) -> list[str]:
     return [n for n in names if n.rpartition("/")[2] not in MOVING or n in still]
 
 
-def _named(prefix: str, **values: Any) -> dict[str, Any]:
+def kind_of(shape: Body) -> str:
+    """Which of `shapes.OUTLINES` a body of one shape is."""
+    return {Box.kind: "boxes", ConvexMesh.kind: "meshes"}.get(shape.kind, "rounds")
+
+
+def named(prefix: str, **values: Any) -> dict[str, Any]:
+    """Quantities of a body, link or joint by their whole names."""
     return {f"{prefix}/{name}": value for name, value in values.items()}
 
 
 def _inertial(prefix: str, mass: float, com: FloatArray, inertia: FloatArray) -> dict[str, Any]:
-    return _named(prefix, mass=mass, com=com, inertia=inertia, damping=np.zeros(2), gravity=1.0)
+    return named(prefix, mass=mass, com=com, inertia=inertia, damping=np.zeros(2), gravity=1.0)
 
 
 def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
     quantities: dict[str, Any] = {"gripper/coupled": 1.0}
     axes = {joint.name: motion_subspace(joint) for joint in prepared.joints}
     for joint in robot.joints:
-        quantities |= _named(
+        quantities |= named(
             f"joint/{joint.name}",
             axis=axes[joint.name],
             limits=prepared.limits[joint.name],
@@ -136,13 +139,13 @@ def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
     for link in prepared.links.values():
         prefix = f"link/{link.name}"
         quantities[f"{prefix}/pose"] = poses[link.name].as_array()
-        quantities |= outlines(
-            prefix,
-            [reach(shape_points(shape)) for shape in link.shapes if shape.size],
-            [reach(shape_points(shape)) for shape in link.shapes if not shape.size],
+        shapes = (
+            ("boxes" if shape.size else "meshes", reach(shape_points(shape)))
+            for shape in link.shapes
         )
+        quantities |= named(prefix, **outlines(shapes))
         if link.shapes:
-            quantities |= _named(prefix, friction=robot.friction, restitution=0.0, margin=0.0)
+            quantities |= named(prefix, friction=robot.friction, restitution=0.0, margin=0.0)
         if link.name in moving:
             quantities |= _inertial(prefix, link.mass, link.centre, link.inertia)
     return quantities

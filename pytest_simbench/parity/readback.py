@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.parity.quantities import touches
+from pytest_simbench.description.shapes import outlines
+from pytest_simbench.parity.quantities import named, touches
 from pytest_simbench.scene import FloatArray
 
 
@@ -16,49 +17,84 @@ class ReadBack(ABC):
     """Reads the quantities of `parity.quantities` that an engine tells.
 
     It is a part of its adapter, and asks the engine about what the adapter built. Scene and robot
-    give names, never values. What the engine does not tell is left out, and declared.
+    give names, never values. What the engine does not tell is left out, and declared. The methods
+    name quantities without what they are of: `mass`, not `body/cube/mass`.
 
     Args:
         simulator: the adapter, whose world was loaded.
+        ground, bodies, links: what stands for them, bodies and links by name: anything by which
+            the methods ask the engine, called a part.
 
     Attributes:
         scene, prepared: the adapter's; the reduced robot is None in a scene without one.
     """
 
-    def __init__(self, simulator: Any) -> None:
+    def __init__(
+        self, simulator: Any, ground: Any, bodies: Mapping[str, Any], links: Mapping[str, Any]
+    ) -> None:
         self.scene, self.prepared = simulator.scene, simulator.prepared
+        self.ground, self.bodies, self.links = ground, bodies, links
 
     def all(self) -> dict[str, Any]:
         """Every quantity that the engine tells, by its name."""
-        reported = self.world()
+        reported = self.world() | named("ground", **self.surface(self.ground))
+        reported.pop("ground/margin", None)
         for body in self.scene.bodies:
-            reported |= self.body(f"body/{body.name}", body.name)
+            part = self.bodies[body.name]
+            found = self.part(part) | self.body(part, body.name)
+            reported |= named(f"body/{body.name}", **found)
         if self.prepared is not None:
             robot = self.prepared.robot
             for name in self.prepared.links:
-                reported |= self.link(f"link/{name}", name)
+                found = self.part(self.links[name])
+                if name != self.prepared.root:
+                    found |= self.inertial(self.links[name])
+                reported |= named(f"link/{name}", **found)
             for name in robot.joint_names:
-                reported |= self.joint(f"joint/{name}", name)
+                reported |= named(f"joint/{name}", **self.joint(name))
             for k, points in enumerate(self.closures()):
                 reported[f"closure/{k}/points"] = points
             coupled = self.coupled(robot.gripper.couplings)
             reported |= {} if coupled is None else {"gripper/coupled": float(coupled)}
         return reported | self.touches()
 
+    def part(self, part: Any) -> dict[str, Any]:
+        """Pose, shapes and surface of a body or link."""
+        shapes = list(self.shapes(part))
+        surface = self.surface(part) if shapes else {}
+        return {"pose": self.pose(part), **outlines(shapes, self.asked(part)), **surface}
+
     @abstractmethod
     def world(self) -> dict[str, Any]:
-        """Gravity, time step, and the ground's quantities."""
+        """Gravity, time step, and the ground's height."""
 
     @abstractmethod
-    def body(self, prefix: str, name: str) -> dict[str, Any]:
-        """The quantities of a body, their names behind the prefix."""
+    def pose(self, part: Any) -> Any:
+        """Of the frame of a body or link, (7,)."""
 
     @abstractmethod
-    def link(self, prefix: str, name: str) -> dict[str, Any]:
-        """The quantities of a link of the reduced robot; of one that moves with its inertia."""
+    def shapes(self, part: Any) -> Iterable[tuple[str, FloatArray]]:
+        """Of a body or link, each by its kind and its reach, see `shapes.outlines`."""
+
+    def asked(self, part: Any) -> list[FloatArray] | None:
+        """The reaches that the scene asks for, of an engine whose shapes are measured; None: as
+        exactly as they were made."""
+        return None
 
     @abstractmethod
-    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+    def surface(self, part: Any) -> dict[str, Any]:
+        """Friction, restitution and margin of the ground, a body or a link."""
+
+    @abstractmethod
+    def inertial(self, part: Any) -> dict[str, Any]:
+        """Mass, centre of mass, inertia, damping and gravity of a body or link that moves."""
+
+    @abstractmethod
+    def body(self, part: Any, name: str) -> dict[str, Any]:
+        """What a body has beside shapes and surface; of one that forces move with its inertia."""
+
+    @abstractmethod
+    def joint(self, name: str) -> dict[str, Any]:
         """The quantities of a driven joint."""
 
     def closures(self) -> Iterable[FloatArray]:
@@ -69,14 +105,26 @@ class ReadBack(ABC):
         """Whether the fingers of each pair are coupled; None: the engine does not tell."""
         return None
 
-    def can_touch(self, a: str, b: str) -> bool:
-        """Whether two of "ground", `body/NAME` and `link/NAME` can collide; of two links, whether
-        any of their shapes can."""
+    def touches(self) -> dict[str, Any]:
+        """What can collide with what: all of the shapes of two parts, of two links any."""
+        return touches(self.scene, self.prepared, self._can_touch)
+
+    def collide(self, first: Any, second: Any) -> Any:
+        """Whether shapes of two parts can collide: of each of one and each of the other, (n, m)."""
         raise NotImplementedError
 
-    def touches(self) -> dict[str, Any]:
-        """What can collide with what, by `can_touch`."""
-        return touches(self.scene, self.prepared, self.can_touch)
+    def _can_touch(self, a: str, b: str) -> bool:
+        found = np.asarray(self.collide(self._named(a), self._named(b)), dtype=bool)
+        if a.startswith("link/") and b.startswith("link/"):
+            return bool(found.any())
+        return bool(found.size and found.all())
+
+    def _named(self, name: str) -> Any:
+        """The part of "ground", `body/NAME` or `link/NAME`."""
+        kind, _, rest = name.partition("/")
+        if kind == "ground":
+            return self.ground
+        return self.bodies[rest] if kind == "body" else self.links[rest]
 
 
 def one_value(values: Any) -> Any:

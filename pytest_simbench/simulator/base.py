@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.description.carried import Carried
+from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.ground.errors import NotSupportedError
 from pytest_simbench.records.choices import Seen
 from pytest_simbench.scene import FloatArray, Scene, Vector3
@@ -44,6 +45,14 @@ LOOK_AT: Vector3 = (0.6, 0.0, 0.5)
 
 FIELD_OF_VIEW = math.radians(40.0)
 """Vertical [rad]."""
+
+
+def view_axes() -> FloatArray:
+    """The picture's right and down, and ahead of the camera: columns, in the world, (3, 3)."""
+    ahead = np.subtract(LOOK_AT, EYE) / np.linalg.norm(np.subtract(LOOK_AT, EYE))
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return np.column_stack([right, np.cross(ahead, right), ahead])
 
 
 def chosen_on(*tuned: Seen, real: tuple[Seen, ...] = ()) -> Mapping[str, tuple[Seen, ...]]:
@@ -89,6 +98,7 @@ class Simulator(ABC):
         chosen_on: by profile, the seeds or measured motions by whose results its settings were
             chosen, or others rejected; a report on the same says so.
         settings: those of this instance.
+        scene, prepared: what `begin` was given, and its reduced robot, None in one without.
         gui: whether a window is to be opened in `load`.
     """
 
@@ -96,11 +106,18 @@ class Simulator(ABC):
     profiles: ClassVar[Mapping[str, Settings]]
     chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = {}
 
+    scene: Scene
+    prepared: PreparedRobot | None
     _steps: int = 0
 
     def __init__(self, settings: Settings, *, gui: bool = False) -> None:
         self.settings = settings
         self.gui = gui
+
+    def begin(self, scene: Scene) -> None:
+        """Have `scene` and `prepared`, and no steps so far; for `load` to call first."""
+        self.scene, self._steps = scene, 0
+        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
 
     def read_file(self, path: str) -> tuple[Scene, tuple[Carried, ...]]:
         """A file of the engine's own format as a scene, and what was carried of it.

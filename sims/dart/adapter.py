@@ -13,10 +13,8 @@ What was learnt stands in docs/engines/dart.md.
 from __future__ import annotations
 
 import tempfile
-import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Any, ClassVar
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -27,8 +25,6 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     lazy_import,
@@ -47,7 +43,7 @@ State = tuple[float, list[tuple[FloatArray, FloatArray, FloatArray]], FloatArray
 class DART(Simulator):
     """Adapter of DART."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="dart",
         title="DART",
         distribution="dartpy",
@@ -98,12 +94,12 @@ class DART(Simulator):
         ),
         install_size_mb=80,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: DARTSettings
 
     def load(self, scene: Scene) -> None:
-        self.scene = scene
+        self.begin(scene)
         self.world = world = dartpy.simulation.World()
         self._set_options(world, scene)
         slab = self.settings.detector in ONE_CONTACT_ON_A_PLANE
@@ -112,10 +108,8 @@ class DART(Simulator):
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         self._robot: Any = None
-        self.prepared = None
         self._base = np.empty(0)
-        if scene.robot is not None:
-            self.prepared = PreparedRobot(scene.robot)
+        if self.prepared is not None:
             self._load_robot(self.prepared)
         self._viewer = self._open_window() if self.gui else None
 
@@ -150,8 +144,7 @@ class DART(Simulator):
         options.mDefaultRootJointType = utils.DartLoaderRootJointType.FIXED
         loader.setOptions(options)
         with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "robot.urdf"
-            path.write_text(_with_mimic(prepared), encoding="utf-8")
+            path = prepared.write_urdf(folder, mimic=True)  # which dartpy cannot set itself
             self._robot = skeleton = loader.parseSkeleton(str(path))
         skeleton.setSelfCollisionCheck(robot.self_collide)  # but for links that a joint joins
         for body in skeleton.getBodyNodes():
@@ -303,13 +296,3 @@ class DART(Simulator):
 
     def close(self) -> None:
         self._viewer = self._node = None
-
-
-def _with_mimic(prepared: PreparedRobot) -> str:
-    """The reduced URDF, its other fingers following the first: dartpy cannot set that itself."""
-    fingers = prepared.robot.gripper.joints
-    root = ET.fromstring(prepared.to_urdf())
-    for joint in root.findall("joint"):
-        if joint.attrib["name"] in fingers[1:]:
-            ET.SubElement(joint, "mimic", joint=fingers[0], multiplier="1", offset="0")
-    return ET.tostring(root, encoding="unicode")

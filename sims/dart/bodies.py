@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import tempfile
-import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pytest_simbench.description.shapes import write_obj
+from pytest_simbench.description.urdf import body_urdf
 from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Pose, Sphere
 from pytest_simbench.simulator import NotSupportedError, lazy_import
 
@@ -103,12 +103,10 @@ def _shape(body: Body) -> Any:
 def _mesh(body: ConvexMesh) -> Any:
     """The shape of a mesh. dartpy makes one only of a file that a URDF names."""
     with tempfile.TemporaryDirectory() as folder:
-        mesh = write_obj(Path(folder) / "mesh.obj", body.hull)
-        root = ET.Element("robot", name="mesh")
-        shape = ET.SubElement(ET.SubElement(root, "link", name="mesh"), "collision")
-        ET.SubElement(ET.SubElement(shape, "geometry"), "mesh", filename=str(mesh))
-        ET.ElementTree(root).write(f"{folder}/mesh.urdf")
-        skeleton = dartpy.utils.DartLoader().parseSkeleton(f"{folder}/mesh.urdf")
+        path = Path(folder) / "mesh.urdf"
+        text = body_urdf(body, lambda _, hull: write_obj(path.with_suffix(".obj"), hull))
+        path.write_text(text, encoding="utf-8")
+        skeleton = dartpy.utils.DartLoader().parseSkeleton(str(path))
     return skeleton.getBodyNode(0).getShapeNode(0).getShape()
 
 

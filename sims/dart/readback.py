@@ -6,18 +6,12 @@ with a collision detector (FCL, exact) that the world does not use.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import (
-    DIRECTIONS,
-    box_corners,
-    cylinder_reach,
-    outlines,
-    reach,
-    round_reach,
-)
+from pytest_simbench.description.shapes import DIRECTIONS, box_reach, cylinder_reach, round_reach
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import FloatArray, Pose
@@ -33,79 +27,94 @@ class ReadBack(readback.ReadBack):
     """Reads the quantities of `parity.quantities` that DART tells."""
 
     def __init__(self, simulator: Any) -> None:
-        super().__init__(simulator)
-        self.ground, self.bodies = simulator._ground, simulator._bodies
         self.made, self.robot = simulator.world, simulator._robot
+        links = [] if self.robot is None else self.robot.getBodyNodes()
+        links = {body.getName(): body for body in links}
+        super().__init__(simulator, simulator._ground, simulator._bodies, links)
         self.detector = dartpy.collision.FCLCollisionDetector()
         self.probe = dartpy.dynamics.SimpleFrame(dartpy.dynamics.Frame.World(), "probe")
         self.probe.setShape(dartpy.dynamics.BoxShape(np.full(3, _PROBE)))
 
     def world(self) -> dict[str, Any]:
         plane = self.ground.getShapeNode(0)
-        surface = plane.getDynamicsAspect()
-        top = plane.getShape().getSize()[2] / 2 if _is_box(plane) else plane.getShape().getOffset()
+        shape = plane.getShape()
+        slab = isinstance(shape, dartpy.dynamics.BoxShape)
+        top = shape.getSize()[2] / 2 if slab else shape.getOffset()
         return {
             "gravity": self.made.getGravity(),
             "timestep": self.made.getTimeStep(),
-            "ground/friction": surface.getFrictionCoeff(),
-            "ground/restitution": surface.getRestitutionCoeff() ** 2,
             "ground/height": top + plane.getWorldTransform().translation()[2],
         }
 
-    def link(self, prefix: str, name: str) -> dict[str, Any]:
-        body = self.robot.getBodyNode(name)
-        found = self._part(prefix, body, body.getWorldTransform())
-        return found if name == self.prepared.root else found | _inertial(prefix, body)
+    def pose(self, part: Any) -> FloatArray:
+        place = part.getWorldTransform()
+        return np.concatenate([place.translation(), place.quaternion().wxyz()])
 
-    def joint(self, prefix: str, name: str) -> dict[str, Any]:
-        return _joint(prefix, self.robot.getJoint(name))
+    def shapes(self, part: Any) -> Iterator[tuple[str, FloatArray]]:
+        kinds, place = dartpy.dynamics, part.getWorldTransform()
+        for shape in _colliding(part):
+            own, solid = place.inverse().multiply(shape.getWorldTransform()), shape.getShape()
+            pose = Pose.from_array([*own.translation(), *own.quaternion().wxyz()])
+            if isinstance(solid, kinds.BoxShape):
+                yield "boxes", box_reach(solid.getSize(), pose)
+            elif isinstance(solid, kinds.SphereShape):
+                yield "rounds", round_reach(solid.getRadius(), 0.0, pose)
+            elif isinstance(solid, kinds.CapsuleShape):
+                yield "rounds", round_reach(solid.getRadius(), solid.getHeight(), pose)
+            elif isinstance(solid, kinds.CylinderShape):
+                yield "rounds", cylinder_reach(solid.getRadius(), solid.getHeight(), pose)
+            else:
+                yield "meshes", self._measured(shape, place)
+
+    def surface(self, part: Any) -> dict[str, Any]:
+        surfaces = [shape.getDynamicsAspect() for shape in _colliding(part)]
+        return {
+            "friction": one_value([s.getFrictionCoeff() for s in surfaces]),
+            "restitution": one_value([s.getRestitutionCoeff() ** 2 for s in surfaces]),
+        }
+
+    def inertial(self, part: Any) -> dict[str, Any]:
+        inertia = part.getInertia()
+        return {
+            "mass": inertia.getMass(),
+            "com": inertia.getLocalCOM(),
+            "inertia": inertia.getMoment(),
+            "gravity": float(part.getGravityMode()),
+        }
+
+    def body(self, part: Any, name: str) -> dict[str, Any]:
+        joint, kinds = part.getParentJoint(), dartpy.dynamics.ActuatorType
+        driven = joint.getActuatorType() in {kinds.FORCE, kinds.PASSIVE}
+        mobile = part.getSkeleton().isMobile() and joint.getNumDofs() == 6
+        found: dict[str, Any] = {"dynamic": float(mobile and driven)}
+        if joint.getNumDofs() and driven:
+            found |= self.inertial(part)
+            speeds = [part.getCOMLinearVelocity(), part.getAngularVelocity()]
+            found["velocity"] = np.concatenate(speeds)
+            passive = np.array([joint.getDampingCoefficient(k) for k in range(6)])
+            largest = np.array([passive[3:].max(), passive[:3].max()])
+            found["damping"] = largest / [found["mass"], found["inertia"].max()]
+        return found
+
+    def joint(self, name: str) -> dict[str, Any]:
+        joint = self.robot.getJoint(name)
+        forces = [-joint.getForceLowerLimit(0), joint.getForceUpperLimit(0)]
+        passive = joint.getCoulombFriction(0) + joint.getDampingCoefficient(0)
+        limits = [joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0)]
+        return {
+            "axis": np.ravel(joint.getRelativeJacobian()),
+            "limits": limits if joint.areLimitsEnforced() else [-np.inf, np.inf],
+            "effort_limit": one_value(forces),
+            "friction": passive + joint.getSpringStiffness(0),  # all that is not the servo's
+            "initial_position": joint.getPosition(0),
+        }
 
     def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
         mimic = dartpy.dynamics.ActuatorType.MIMIC
         return all(self.robot.getJoint(other).getActuatorType() == mimic for _, other in pairs)
 
-    def body(self, prefix: str, name: str) -> dict[str, Any]:
-        """A body; its frame is that of DART's."""
-        body = self.bodies[name]
-        joint = body.getParentJoint()
-        found = self._part(prefix, body, body.getWorldTransform())
-        mobile = body.getSkeleton().isMobile() and joint.getNumDofs() == 6
-        driven = {dartpy.dynamics.ActuatorType.FORCE, dartpy.dynamics.ActuatorType.PASSIVE}
-        found[f"{prefix}/dynamic"] = float(mobile and joint.getActuatorType() in driven)
-        if joint.getNumDofs() and joint.getActuatorType() in driven:
-            found |= _inertial(prefix, body)
-            speeds = [body.getCOMLinearVelocity(), body.getAngularVelocity()]
-            found[f"{prefix}/velocity"] = np.concatenate(speeds)
-            passive = np.array([joint.getDampingCoefficient(k) for k in range(6)])
-            largest = np.array([passive[3:].max(), passive[:3].max()])
-            inertia = body.getInertia()
-            found[f"{prefix}/damping"] = largest / [inertia.getMass(), inertia.getMoment().max()]
-        return found
-
-    def _part(self, prefix: str, body: Any, place: Any) -> dict[str, Any]:
-        """Pose, shapes and surface of a body."""
-        shapes = _colliding(body)
-        position, turn = place.translation(), place.quaternion().wxyz()
-        found = {f"{prefix}/pose": np.concatenate([position, turn])}
-        boxes = [self._reach(shape, place) for shape in shapes if _is_box(shape)]
-        rounds = [_round(shape, place) for shape in shapes if _is_round(shape)]
-        others = (shape for shape in shapes if not (_is_box(shape) or _is_round(shape)))
-        meshes = [self._reach(shape, place) for shape in others]
-        found |= outlines(prefix, boxes, meshes, rounds)
-        if shapes:
-            surfaces = [shape.getDynamicsAspect() for shape in shapes]
-            found[f"{prefix}/friction"] = one_value([s.getFrictionCoeff() for s in surfaces])
-            found[f"{prefix}/restitution"] = one_value(
-                [s.getRestitutionCoeff() ** 2 for s in surfaces]
-            )
-        return found
-
-    def _reach(self, shape: Any, place: Any) -> FloatArray:
-        """The reach of a shape in the frame at `place`."""
-        if _is_box(shape):
-            own = shape.getWorldTransform()
-            corners = box_corners(shape.getShape().getSize()) @ own.rotation().T
-            return reach((corners + own.translation() - place.translation()) @ place.rotation())
+    def _measured(self, shape: Any, place: Any) -> FloatArray:
+        """The reach of a mesh in the frame at `place`."""
         group = self.detector.createCollisionGroup()
         group.addShapeFrame(shape)
         group.addShapeFrame(self.probe)
@@ -117,79 +126,21 @@ class ReadBack(readback.ReadBack):
             reaches.append(_AWAY - group.distance(option))
         return np.array(reaches) + directions @ (centre - place.translation())
 
-    def can_touch(self, a: str, b: str) -> bool:
-        first, second = self._body(a), self._body(b)
-        if not (first.isCollidable() and second.isCollidable()):
-            return False
+    def collide(self, first: Any, second: Any) -> Any:
+        """Of two bodies as wholes."""
         shapes = [*_colliding(first), *_colliding(second)]
-        if not all(shape.getCollisionAspect().isCollidable() for shape in shapes):
-            return False
-        if first.getSkeleton() is second.getSkeleton() or a[:4] == b[:4] == "link":
+        able = all(shape.getCollisionAspect().isCollidable() for shape in shapes)
+        able = able and first.isCollidable() and second.isCollidable()
+        if first.getSkeleton() is second.getSkeleton():
             skeleton = first.getSkeleton()
-            return bool(
-                skeleton.isEnabledSelfCollisionCheck()
-                and (skeleton.isEnabledAdjacentBodyCheck() or not _adjacent(first, second))
-            )
-        return True
-
-    def _body(self, name: str) -> Any:
-        kind, _, rest = name.partition("/")
-        if kind == "ground":
-            return self.ground
-        return self.bodies[rest] if kind == "body" else self.robot.getBodyNode(rest)
-
-
-def _adjacent(first: Any, second: Any) -> bool:
-    """Whether one joint joins two bodies."""
-    above = (first.getParentBodyNode(), second.getParentBodyNode())
-    return second is above[0] or first is above[1]
+            joined = second is first.getParentBodyNode() or first is second.getParentBodyNode()
+            able = able and skeleton.isEnabledSelfCollisionCheck()
+            able = able and (skeleton.isEnabledAdjacentBodyCheck() or not joined)
+        return [able]
 
 
 def _colliding(body: Any) -> list[Any]:
     return [shape for shape in body.getShapeNodes() if shape.hasCollisionAspect()]
-
-
-def _is_box(shape: Any) -> bool:
-    return isinstance(shape.getShape(), dartpy.dynamics.BoxShape)
-
-
-def _is_round(shape: Any) -> bool:
-    kinds = dartpy.dynamics
-    return isinstance(
-        shape.getShape(), kinds.SphereShape | kinds.CylinderShape | kinds.CapsuleShape
-    )
-
-
-def _round(shape: Any, place: Any) -> FloatArray:
-    """The reach of a sphere, cylinder or capsule in the frame at `place`."""
-    own, solid = place.inverse().multiply(shape.getWorldTransform()), shape.getShape()
-    pose = Pose.from_array([*own.translation(), *own.quaternion().wxyz()])
-    length = getattr(solid, "getHeight", float)()
-    pillar = isinstance(solid, dartpy.dynamics.CylinderShape)
-    return (cylinder_reach if pillar else round_reach)(solid.getRadius(), length, pose)
-
-
-def _inertial(prefix: str, body: Any) -> dict[str, Any]:
-    inertia = body.getInertia()
-    return {
-        f"{prefix}/mass": inertia.getMass(),
-        f"{prefix}/com": inertia.getLocalCOM(),
-        f"{prefix}/inertia": inertia.getMoment(),
-        f"{prefix}/gravity": float(body.getGravityMode()),
-    }
-
-
-def _joint(prefix: str, joint: Any) -> dict[str, Any]:
-    forces = [-joint.getForceLowerLimit(0), joint.getForceUpperLimit(0)]
-    passive = joint.getCoulombFriction(0) + joint.getDampingCoefficient(0)
-    limits = [joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0)]
-    return {
-        f"{prefix}/axis": np.ravel(joint.getRelativeJacobian()),
-        f"{prefix}/limits": limits if joint.areLimitsEnforced() else [-np.inf, np.inf],
-        f"{prefix}/effort_limit": one_value(forces),
-        f"{prefix}/friction": passive + joint.getSpringStiffness(0),  # all that is not the servo's
-        f"{prefix}/initial_position": joint.getPosition(0),
-    }
 
 
 def _facing(direction: FloatArray, origin: FloatArray) -> Any:

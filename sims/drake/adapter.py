@@ -5,46 +5,21 @@ implicitly, with effort feed-forward; the effort limit bounds their whole sum. T
 from the reduced description, link by link: Drake's parser wants a file, reads no STL, and makes
 no actuators with gains.
 
-What was learnt (1.51, tuned settings but for the one named, seed 100):
-- point contact gives one point for a pair of shapes, at the deepest place. A plain box rests on
-  one point that jumps from corner to corner: with the engine's defaults the cubes of the grid
-  never come to rest (up to 0.12 m/s or rad/s), and a held one turns in the hand. `tuned` gives
-  each free box eight spheres in its corners, and each finger four behind its gripping face, that
-  reach the true faces, while the box itself is 0.1 mm smaller a face: four points a face
-- spheres may not touch spheres: stacked cubes then stand sphere on sphere and creep (0.3 mm
-  between release and the end of the task, 5 micrometres without)
-- SAP's `relaxation_time` decides how far a grip sinks in: contacts get at most the
-  stiffness that the step resolves, and then sink (relaxation time + step) / step times deeper. At
-  4 ms and Drake's 0.1 s a squeeze of 25 N sinks 1.4 mm into a cube (5 mm with plain boxes), with
-  0.01 s 0.2 mm
-- nothing but the step changes where the throw lands (stiffness 1e5 to 1e7, relaxation 0 to 0.1,
-  `lagged`: equal within 0.3 mm). Contact velocities are made equal at the
-  start of a step and kept for its length, so a cube leaves a turning hand by v^2 / r dt / 2 a
-  second: 4 ms lands at 1.399, 2 ms at 1.377, 1 ms at 1.366, where a perfect follower's does at
-  1.352. `tuned` takes 2 ms: half of 1 ms's cost
-- quaternions are not kept at length 1; `body_state` normalises, as Drake does where it reads them
+What was learnt stands in docs/engines/drake.md.
 """
 
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.scene import FloatArray, Robot, Scene
-from pytest_simbench.simulator import (
-    Capability,
-    Deviation,
-    Seen,
-    Settings,
-    Simulator,
-    SimulatorInfo,
-    lazy_import,
-)
-from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator import Capability, Deviation, Simulator, SimulatorInfo, lazy_import
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT, view_axes
 
 from .readback import ReadBack
 from .settings import CHOSEN_ON, OLDEST, PROFILES, DrakeSettings
@@ -60,7 +35,7 @@ sensors = lazy_import("pydrake.systems.sensors")
 class Drake(Simulator):
     """Adapter of Drake."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="drake",
         title="Drake",
         distribution="drake",
@@ -109,14 +84,15 @@ class Drake(Simulator):
         ),
         install_size_mb=310,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: DrakeSettings
 
     def load(self, scene: Scene) -> None:
         self.close()
+        self.begin(scene)
         builder = framework.DiagramBuilder()
-        self.world = World(scene, self.settings, builder)
+        self.world = World(scene, self.prepared, self.settings, builder)
         self.plant, self.scene_graph = self.world.plant, self.world.scene_graph
         self._meshcat = self._open_window(builder) if self.gui else None
         self.simulator = analysis.Simulator(builder.Build())
@@ -141,7 +117,6 @@ class Drake(Simulator):
             state[at[7:]] = box.velocity
         self.plant.SetPositionsAndVelocities(self.context, state)
         self._led = [body.prescribed for body in scene.free_bodies]
-        self._steps = 0
         self._has_camera = False
         self.simulator.Initialize()
 
@@ -265,8 +240,9 @@ class Drake(Simulator):
         core = geometry.RenderCameraCore(
             "vtk", lens, geometry.ClippingRange(0.05, 20.0), math.RigidTransform()
         )
+        eye = math.RigidTransform(math.RotationMatrix(view_axes()), EYE)
         image = self._query().RenderColorImage(
-            geometry.ColorRenderCamera(core), self.scene_graph.world_frame_id(), _camera()
+            geometry.ColorRenderCamera(core), self.scene_graph.world_frame_id(), eye
         )
         return np.array(image.data[:, :, :3])
 
@@ -290,13 +266,3 @@ class Drake(Simulator):
             if name not in ("settings", "gui"):
                 delattr(self, name)
         gc.collect()  # pydrake's parts keep each other alive; Meshcat would keep its port
-
-
-def _camera() -> Any:
-    """Pose of the camera, whose z looks ahead and whose y looks down."""
-    ahead = np.subtract(LOOK_AT, EYE)
-    ahead = ahead / np.linalg.norm(ahead)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    turn = np.column_stack([right, np.cross(ahead, right), ahead])
-    return math.RigidTransform(math.RotationMatrix(turn), EYE)

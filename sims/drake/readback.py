@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import chain
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pytest_simbench.description.shapes import (
-    box_corners,
+    OUTLINES,
+    box_reach,
     cylinder_reach,
-    outlines,
     placed,
     reach,
     round_reach,
 )
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import Body, FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import
 
 from .world import World, transform
@@ -28,162 +28,153 @@ math = lazy_import("pydrake.math")
 trees = lazy_import("pydrake.multibody.tree")
 
 
+@dataclass(frozen=True)
+class Part:
+    """The ground, a body or a link.
+
+    Attributes:
+        body: of Drake.
+        shapes: its own, or those of the world that are meant.
+        frame: in the body's; that of a fixed body, which is a shape of the world, is the shape's.
+    """
+
+    body: Any
+    shapes: Sequence[Any]
+    frame: Any
+
+
 class ReadBack(readback.ReadBack):
     """Reads the quantities of `parity.quantities` from plant, shapes and context."""
 
     def __init__(self, simulator: Any) -> None:
-        super().__init__(simulator.world)
         self.made: World = simulator.world
         self.plant, self.context = simulator.plant, simulator.context
         shapes = self.plant.get_geometry_query_input_port().Eval(self.context)
         self.inspector = shapes.inspector()
+        own = math.RigidTransform()
+        super().__init__(
+            simulator,
+            Part(self.plant.world_body(), self.made.shapes["ground"], own),
+            {body.name: self._body(body) for body in simulator.scene.bodies},
+            {
+                name: Part(body, self.made.shapes.get(name, ()), own)
+                for name, body in self.made.links.items()
+            },
+        )
+
+    def _body(self, body: Body) -> Part:
+        made, shapes = self.made.bodies[body.name], self.made.shapes[body.name]
+        frame = math.RigidTransform()
+        if made.index() == self.plant.world_body().index():
+            first = transform(body.parts[0].pose)
+            frame = self.inspector.GetPoseInFrame(shapes[0]) @ first.inverse()
+        return Part(made, shapes, frame)
 
     def world(self) -> dict[str, Any]:
-        ground = self.inspector.GetPoseInFrame(self.made.shapes["ground"][0])
+        ground = self.inspector.GetPoseInFrame(self.ground.shapes[0])
         return {
             "gravity": self.plant.gravity_field().gravity_vector(),
             "timestep": self.plant.time_step(),
             "ground/height": ground.translation()[2],
-            "ground/friction": self._friction("ground"),
         }
 
-    def body(self, prefix: str, name: str) -> dict[str, Any]:
-        """A body; a fixed one is a shape of the world, whose frame is the shape's own."""
-        body = self.made.bodies[name]
-        free = body.index() != self.plant.world_body().index()
-        frame = math.RigidTransform()
-        if not free:
-            first = transform(self.scene.body(name).parts[0].pose)
-            frame = self.inspector.GetPoseInFrame(self.made.shapes[name][0]) @ first.inverse()
-        pose = self.plant.EvalBodyPoseInWorld(self.context, body)
-        found = self._part(prefix, name, pose, frame)
+    def body(self, part: Part, name: str) -> dict[str, Any]:
+        body = part.body
         light = body.default_mass() < heavy(self.scene)  # else it moves as prescribed
-        found[f"{prefix}/dynamic"] = float(free and light and not body.is_locked(self.context))
-        if free and light:
-            found |= self._inertial(prefix, body)
+        free = light and body.index() != self.plant.world_body().index()
+        found: dict[str, Any] = {"dynamic": float(free and not body.is_locked(self.context))}
+        if free:
+            found |= self.inertial(part)
             speed = self.plant.EvalBodySpatialVelocityInWorld(self.context, body)
-            found[f"{prefix}/velocity"] = [*speed.translational(), *speed.rotational()]
+            found["velocity"] = [*speed.translational(), *speed.rotational()]
             joint = self.made.floating_joint(body)
-            found[f"{prefix}/damping"] = [
-                joint.default_translational_damping() / found[f"{prefix}/mass"],
-                joint.default_angular_damping() / np.max(found[f"{prefix}/inertia"]),
+            found["damping"] = [
+                joint.default_translational_damping() / found["mass"],
+                joint.default_angular_damping() / np.max(found["inertia"]),
             ]
         return found
 
-    def link(self, prefix: str, name: str) -> dict[str, Any]:
-        body = self.made.links[name]
-        pose = self.plant.EvalBodyPoseInWorld(self.context, body)
-        found = self._part(prefix, name, pose, math.RigidTransform())
-        return found if name == self.prepared.root else found | self._inertial(prefix, body)
-
-    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+    def joint(self, name: str) -> dict[str, Any]:
         joint, drive = self.made.joints[name], self.made.drives[name]
         gains = drive.get_controller_gains()
         return {
-            f"{prefix}/axis": _axis(joint),
-            f"{prefix}/limits": [
-                joint.position_lower_limits()[0],
-                joint.position_upper_limits()[0],
-            ],
-            f"{prefix}/effort_limit": drive.effort_limit(),
-            f"{prefix}/stiffness": gains.p,
-            f"{prefix}/damping": gains.d + joint.GetDampingVector(self.context)[0],
-            f"{prefix}/armature": drive.calc_reflected_inertia(self.context),
-            f"{prefix}/initial_position": joint.GetOnePosition(self.context),
+            "axis": _axis(joint),
+            "limits": [joint.position_lower_limits()[0], joint.position_upper_limits()[0]],
+            "effort_limit": drive.effort_limit(),
+            "stiffness": gains.p,
+            "damping": gains.d + joint.GetDampingVector(self.context)[0],
+            "armature": drive.calc_reflected_inertia(self.context),
+            "initial_position": joint.GetOnePosition(self.context),
         }
 
     def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
         active = self.plant.GetConstraintActiveStatus
         return all(active(self.context, made) for made in self.made.couplings)
 
-    def _part(self, prefix: str, owner: str, pose: Any, frame: Any) -> dict[str, Any]:
-        """Pose, shapes and surface of what is in `frame` of a body at `pose` in the world."""
-        place = pose @ frame
-        shapes = self.made.shapes.get(owner, [])
-        found: dict[str, Any] = {
-            f"{prefix}/pose": [*place.translation(), *place.rotation().ToQuaternion().wxyz()],
-        }
-        kinds: dict[Any, list[FloatArray]] = {}
-        for made in shapes:
-            corner = made in self.made.spheres
-            kind = "corner" if corner else type(self.inspector.GetShape(made))
-            kinds.setdefault(kind, []).append(self._reach(made, frame))
-        boxes, spheres = kinds.pop(geometry.Box, []), kinds.pop("corner", [])
-        round_kinds = geometry.Sphere, geometry.Cylinder, geometry.Capsule
-        rounds = list(chain(*(kinds.pop(kind, []) for kind in round_kinds)))
-        meshes = list(chain(*kinds.values()))
-        boxes, meshes = _merged(boxes, meshes, spheres)
-        found |= outlines(prefix, boxes, meshes, rounds)
-        if shapes:
-            found[f"{prefix}/friction"] = self._friction(owner)
-            found[f"{prefix}/margin"] = self._margin(owner)
+    def pose(self, part: Part) -> list[float]:
+        place = self.plant.EvalBodyPoseInWorld(self.context, part.body) @ part.frame
+        return [*place.translation(), *place.rotation().ToQuaternion().wxyz()]
+
+    def shapes(self, part: Part) -> list[tuple[str, FloatArray]]:
+        """Each sphere in a corner (`world`) is one with what it sticks out of least: a box, where
+        there are any."""
+        found = [self._shape(made, part.frame) for made in self._solids(part)]
+        found.sort(key=lambda shape: OUTLINES.index(shape[0]))
+        own = [reached for kind, reached in found if kind == found[0][0]]
+        for made in part.shapes:
+            if made in self.made.spheres:
+                _, sphere = self._shape(made, part.frame)
+                k = int(np.argmin([np.max(sphere - reached) for reached in own]))
+                found[k] = found[k][0], np.maximum(found[k][1], sphere)
         return found
 
-    def _reach(self, made: Any, frame: Any) -> FloatArray:
-        """The reach of a shape in `frame`."""
+    def _shape(self, made: Any, frame: Any) -> tuple[str, FloatArray]:
+        """Kind and reach of a shape in `frame`."""
         shape = self.inspector.GetShape(made)
         place = frame.inverse() @ self.inspector.GetPoseInFrame(made)
         pose = Pose.from_array([*place.translation(), *place.rotation().ToQuaternion().wxyz()])
         if isinstance(shape, geometry.Sphere):
-            return round_reach(shape.radius(), 0.0, pose)
+            return "rounds", round_reach(shape.radius(), 0.0, pose)
         if isinstance(shape, geometry.Capsule):
-            return round_reach(shape.radius(), shape.length(), pose)
+            return "rounds", round_reach(shape.radius(), shape.length(), pose)
         if isinstance(shape, geometry.Cylinder):
-            return cylinder_reach(shape.radius(), shape.length(), pose)
+            return "rounds", cylinder_reach(shape.radius(), shape.length(), pose)
         if isinstance(shape, geometry.Box):
-            return reach(placed(box_corners(shape.size()), pose))
+            return "boxes", box_reach(shape.size(), pose)
         hull = self.inspector.GetConvexHull(made)
         corners = [hull.vertex(k) for k in range(hull.num_vertices())]
-        return reach(placed(np.array(corners), pose))
+        return "meshes", reach(placed(np.array(corners), pose))
 
-    def _inertial(self, prefix: str, body: Any) -> dict[str, Any]:
-        inertia = body.CalcSpatialInertiaInBodyFrame(self.context)
+    def inertial(self, part: Part) -> dict[str, Any]:
+        inertia = part.body.CalcSpatialInertiaInBodyFrame(self.context)
         com = inertia.get_com()
         central = inertia.Shift(com).CalcRotationalInertia()
-        enabled = self.plant.gravity_field().is_enabled(body.model_instance())
+        enabled = self.plant.gravity_field().is_enabled(part.body.model_instance())
         return {
-            f"{prefix}/mass": inertia.get_mass(),
-            f"{prefix}/com": com,
-            f"{prefix}/inertia": central.CopyToFullMatrix3(),
-            f"{prefix}/gravity": float(enabled),
+            "mass": inertia.get_mass(),
+            "com": com,
+            "inertia": central.CopyToFullMatrix3(),
+            "gravity": float(enabled),
         }
 
-    def _friction(self, name: str) -> Any:
-        """The one friction coefficient of all shapes of a body; all of them if they differ."""
-        values = []
-        for made in self.made.shapes[name]:
-            surface = self.inspector.GetProximityProperties(made)
-            friction = surface.GetProperty("material", "coulomb_friction")
-            values += [friction.static_friction(), friction.dynamic_friction()]
-        return one_value(values)
+    def surface(self, part: Part) -> dict[str, Any]:
+        surfaces = [self.inspector.GetProximityProperties(made) for made in part.shapes]
+        frictions = [s.GetProperty("material", "coulomb_friction") for s in surfaces]
+        margins = [s.GetPropertyOrDefault("hydroelastic", "margin", 0.0) for s in surfaces]
+        return {
+            "friction": one_value([[f.static_friction(), f.dynamic_friction()] for f in frictions]),
+            "margin": one_value(margins),
+        }
 
-    def _margin(self, name: str) -> Any:
-        surfaces = (self.inspector.GetProximityProperties(m) for m in self.made.shapes[name])
-        return one_value([s.GetPropertyOrDefault("hydroelastic", "margin", 0.0) for s in surfaces])
+    def collide(self, first: Part, second: Part) -> Any:
+        return [
+            [not self.inspector.CollisionFiltered(x, y) for y in self._solids(second)]
+            for x in self._solids(first)
+        ]
 
-    def can_touch(self, a: str, b: str) -> bool:
-        """Whether the main shapes of two can collide; of two links, whether any can."""
-        pairs = [(x, y) for x in self._shapes(a) for y in self._shapes(b)]
-        found = (not self.inspector.CollisionFiltered(x, y) for x, y in pairs)
-        return any(found) if a[:4] == b[:4] == "link" else bool(pairs) and all(found)
-
-    def _shapes(self, name: str) -> Sequence[Any]:
-        """All but the spheres in corners, which do not collide with each other."""
-        made = self.made.shapes.get(name.partition("/")[2] or name, [])
-        return [m for m in made if m not in self.made.spheres]
-
-
-def _merged(
-    boxes: Sequence[FloatArray], meshes: Sequence[FloatArray], spheres: Sequence[FloatArray]
-) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Reaches of boxes and meshes, each sphere made one with what it sticks out of least; a box,
-    where there are any: meshes of links have no spheres."""
-    own = list(boxes or meshes)
-    merged = list(own)
-    for sphere in spheres:  # which the adapter adds, see `world`
-        k = int(np.argmin([np.max(sphere - shape) for shape in own]))
-        merged[k] = np.maximum(merged[k], sphere)
-    return (merged, list(meshes)) if boxes else ([], merged)
+    def _solids(self, part: Part) -> list[Any]:
+        """Its shapes but the spheres in corners, which do not collide with each other."""
+        return [made for made in part.shapes if made not in self.made.spheres]
 
 
 def _axis(joint: Any) -> FloatArray:

@@ -57,9 +57,10 @@ class World:
         couplings: ids of the constraints between the fingers.
     """
 
-    def __init__(self, scene: Scene, settings: DrakeSettings, builder: Any) -> None:
-        self.settings, self.scene = settings, scene
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
+    def __init__(
+        self, scene: Scene, prepared: PreparedRobot | None, settings: DrakeSettings, builder: Any
+    ) -> None:
+        self.settings, self.scene, self.prepared = settings, scene, prepared
         self.plant, self.scene_graph = plants.AddMultibodyPlant(self._options(), builder)
         self.scene_graph.set_config(self._surfaces())
         self.plant.mutable_gravity_field().set_gravity_vector(scene.gravity)

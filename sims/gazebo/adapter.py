@@ -9,23 +9,13 @@ What was learnt stands in docs/engines/gazebo.md.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Scene
-from pytest_simbench.simulator import (
-    FOLLOWER,
-    Capability,
-    Deviation,
-    PreparedRobot,
-    Seen,
-    Settings,
-    Simulator,
-    SimulatorInfo,
-)
+from pytest_simbench.simulator import FOLLOWER, Capability, Deviation, Simulator, SimulatorInfo
 
 from .bindings import MODULES, bindings, library_version
 from .drives import Drives
@@ -46,7 +36,7 @@ ARCHIVE = "https://gazebosim.org/docs/harmonic/install_ubuntu"
 class Gazebo(Simulator):
     """Adapter of Gazebo."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="gazebo",
         title="Gazebo",
         distribution="gz-sim",
@@ -118,18 +108,17 @@ class Gazebo(Simulator):
         environment={"GZ_IP": "127.0.0.1"},
         install_size_mb=1500,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: GazeboSettings
     _window: Window | None = None
 
     def load(self, scene: Scene) -> None:
+        self.begin(scene)
         s = self.settings
-        self.scene, self._steps = scene, 0
         self._physics = Physics(
             s.engine, s.timestep, s.detector, s.solver, s.torsional_friction, is_lone(scene)
         )
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         name = new_name()
         self._files = tempfile.TemporaryDirectory(prefix="simbench-gazebo-")  # of bodies' meshes
         folder = Path(self._files.name)
@@ -163,14 +152,7 @@ class Gazebo(Simulator):
         return bindings().sim.Model(self.server.world.model_by_name(ecm, name))
 
     def read_back(self) -> dict[str, Any]:
-        return ReadBack(
-            self.server,
-            self._physics,
-            robot_model(self.scene),
-            self._drives,
-            self.scene,
-            self.prepared,
-        ).all()
+        return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         # A velocity command finds the effort itself, so there is nothing to feed forward.
@@ -190,10 +172,6 @@ class Gazebo(Simulator):
             self._wrenches.act(self.body_state())
         self.server.step()
         self._steps += 1
-
-    @property
-    def time(self) -> float:
-        return self._steps * self.settings.timestep
 
     def body_state(self) -> FloatArray:
         state, ecm = np.zeros((len(self._free), 13)), self.server.ecm

@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 import gc
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,9 +23,6 @@ from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
-    PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     heavy,
@@ -46,14 +43,7 @@ from .engine import (
 )
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, GenesisSettings
-from .world import (
-    LEAST_FRICTION,
-    add_body,
-    add_camera,
-    add_robot,
-    material,
-    new_world,
-)
+from .world import LEAST_FRICTION, add_body, add_camera, add_robot, material, new_world
 
 genesis = lazy_import("genesis")
 
@@ -64,7 +54,7 @@ MOST_BOUNCE = 0.9999
 class Genesis(Simulator):
     """Adapter of Genesis."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="genesis",
         title="Genesis",
         distribution="genesis-world",
@@ -93,8 +83,8 @@ class Genesis(Simulator):
         install_size_mb=3700,
         language="Python (Quadrants)",
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: GenesisSettings
     world: Any = None
     compiled: ClassVar[set[tuple[Any, ...]]] = set()
@@ -129,9 +119,8 @@ class Genesis(Simulator):
         self.compiled.add(kind)
 
     def load(self, scene: Scene) -> None:
-        self.scene, self._steps = scene, 0
+        self.begin(scene)
         self._camera: Any = None
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         start_engine(self.settings.precision)
         self.world = world = new_world(scene, self.settings, window=self.gui)
         self._ground = world.add_entity(
@@ -157,10 +146,12 @@ class Genesis(Simulator):
             parameters[:, 2:4] = self.settings.impedance
             for geom, values in zip(geoms, parameters, strict=True):
                 geom.set_sol_params(values)
-        bouncing = {self._boxes[body.name]: body.restitution for body in scene.bodies}
-        bouncing[self._ground] = scene.ground_restitution
+        surfaces = [(self._boxes[b.name], b.friction, b.restitution) for b in scene.bodies]
+        surfaces.append((self._ground, scene.ground_friction, scene.ground_restitution))
+        if scene.robot is not None:
+            surfaces.append((self._robot, scene.robot.friction, 0.0))
         substep = self.settings.timestep / self.settings.substeps
-        for entity, restitution in bouncing.items():
+        for entity, friction, restitution in surfaces:
             if restitution:
                 stiffness, damping = direct(min(restitution, MOST_BOUNCE), substep)
                 ratio = -damping / (2 * math.sqrt(-stiffness))
@@ -168,11 +159,6 @@ class Genesis(Simulator):
                     values = contact_parameters(geom)
                     values[:2] = -2 / damping, ratio  # time constant, damping ratio
                     geom.set_sol_params(values)
-        frictions = {self._boxes[box.name]: box.friction for box in scene.bodies}
-        frictions[self._ground] = scene.ground_friction
-        if scene.robot is not None:
-            frictions[self._robot] = scene.robot.friction
-        for entity, friction in frictions.items():
             if friction < LEAST_FRICTION:
                 for geom in entity.geoms:
                     solver.set_geom_friction(friction, geom.idx)
@@ -181,14 +167,13 @@ class Genesis(Simulator):
         """Velocities and damping of free bodies: linear in the world's axes, angular in the
         body's."""
         for box in scene.free_bodies:
+            link = self._boxes[box.name].links[0]
+            dofs = list(range(link.dof_start, link.dof_end))
             if box.damping.any():
-                link = self._boxes[box.name].links[0]
                 spins = box.angular_damping * box.inertia()
                 damping = [*[box.linear_damping * box.mass] * 3, *spins]
-                self.solver.set_dofs_damping(damping, list(range(link.dof_start, link.dof_end)))
+                self.solver.set_dofs_damping(damping, dofs)
             if box.velocity.any():
-                link = self._boxes[box.name].links[0]
-                dofs = list(range(link.dof_start, link.dof_end))
                 spin = box.pose.rotation().T @ box.angular_velocity
                 self.solver.set_dofs_velocity([*box.linear_velocity, *spin], dofs)
 

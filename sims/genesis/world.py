@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-import xml.etree.ElementTree as ET
 from math import degrees
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 
 from pytest_simbench.description.links import reduced
 from pytest_simbench.description.shapes import write_obj
-from pytest_simbench.description.urdf import write_origin
+from pytest_simbench.description.urdf import body_urdf
 from pytest_simbench.scene import Body, Box, Capsule, Compound, ConvexMesh, Cylinder, Scene, Sphere
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
@@ -103,22 +102,11 @@ def _morph(body: Body) -> Any:
 def _described(body: Body, folder: Path) -> Any:
     """A body with moments of inertia of its own, by a URDF: other morphs know a density. Files go
     into the folder."""
-    root = ET.Element("robot", name=body.name)
-    link = ET.SubElement(root, "link", name=body.name)
-    if body.mass:
-        inertial = ET.SubElement(link, "inertial")
-        # without an origin it takes the shape's moments
-        ET.SubElement(inertial, "origin", xyz="0 0 0", rpy="0 0 0")
-        ET.SubElement(inertial, "mass", value=repr(float(body.mass)))
-        xx, yy, zz = (repr(float(moment)) for moment in body.inertia())
-        ET.SubElement(inertial, "inertia", ixx=xx, iyy=yy, izz=zz, ixy="0", ixz="0", iyz="0")
-    for kind in ("visual", "collision"):
-        for k, part in enumerate(body.parts):
-            element = ET.SubElement(link, kind)
-            write_origin(element, part.pose)
-            _shape(ET.SubElement(element, "geometry"), part, folder / f"{k}.obj")
+    for part in body.parts:
+        if isinstance(part, Capsule):
+            raise NotSupportedError("genesis takes no moments of inertia of a Capsule")
     return genesis.morphs.URDF(
-        file=ET.tostring(root, encoding="unicode"),
+        file=body_urdf(body, lambda name, hull: write_obj(folder / f"{name}.obj", hull)),
         pos=body.pose.position,
         quat=body.pose.quaternion,
         fixed=body.fixed,
@@ -127,35 +115,11 @@ def _described(body: Body, folder: Path) -> Any:
     )
 
 
-def _shape(geometry: ET.Element, body: Body, file: Path) -> None:
-    """A body's shape in a URDF; a mesh goes into the file."""
-    match body:
-        case Box():
-            ET.SubElement(geometry, "box", size=" ".join(repr(float(edge)) for edge in body.size))
-        case Sphere():
-            ET.SubElement(geometry, "sphere", radius=repr(float(body.radius)))
-        case Cylinder():
-            size = {"radius": repr(float(body.radius)), "length": repr(float(body.length))}
-            ET.SubElement(geometry, "cylinder", size)
-        case ConvexMesh():
-            mesh = write_obj(file, body.hull)
-            ET.SubElement(geometry, "mesh", filename=str(mesh))
-        case _:
-            raise NotSupportedError(
-                f"genesis takes no moments of inertia of a {type(body).__name__}"
-            )
-
-
 def add_robot(world: Any, prepared: PreparedRobot) -> Any:
     """The entity of the reduced robot. Equality constraints hold its fingers together, and close
     its loops."""
-    xml = ET.fromstring(prepared.to_urdf())
-    fingers = prepared.robot.gripper.joints
-    for joint in xml.findall("joint"):
-        if joint.attrib["name"] in fingers[1:]:  # becomes an equality constraint
-            ET.SubElement(joint, "mimic", joint=fingers[0], multiplier="1", offset="0")
     morph = genesis.morphs.URDF(
-        file=ET.tostring(xml, encoding="unicode"),
+        file=prepared.to_urdf(mimic=True),  # becomes an equality constraint
         fixed=True,
         merge_fixed_links=False,
         decimate=False,  # else hulls of more than 500 faces are simplified, by up to 0.3 mm

@@ -9,9 +9,9 @@ What was learnt stands in docs/engines/mujoco.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +19,7 @@ from numpy.typing import NDArray
 from pytest_simbench.description.carried import Carried
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotations
-from pytest_simbench.simulator import (
-    Capability,
-    Deviation,
-    PreparedRobot,
-    Seen,
-    Settings,
-    Simulator,
-    SimulatorInfo,
-    lazy_import,
-)
+from pytest_simbench.simulator import Capability, Deviation, Simulator, SimulatorInfo, lazy_import
 
 from .bounces import BOUNCES
 from .own_file import FileReadBack, OwnFile
@@ -36,7 +27,7 @@ from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from .reading import Reading
 from .settings import CHOSEN_ON, PROFILES, FileSettings, MuJoCoSettings
-from .world import build, leave_out
+from .world import build, leave_out, shape_label
 
 mujoco = lazy_import("mujoco")
 
@@ -44,7 +35,7 @@ mujoco = lazy_import("mujoco")
 class MuJoCo(Simulator):
     """Adapter of MuJoCo."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="mujoco",
         title="MuJoCo",
         distribution="mujoco",
@@ -73,14 +64,14 @@ class MuJoCo(Simulator):
         install_size_mb=60,
         environment=DISABLED,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: MuJoCoSettings
 
-    prepared: PreparedRobot | None
     _own_file: OwnFile | None = None
 
     def load(self, scene: Scene) -> None:
+        self.begin(scene)
         self._viewer: Any = None
         self._renderer: Any = None
         if isinstance(self.settings, FileSettings):
@@ -93,18 +84,15 @@ class MuJoCo(Simulator):
 
     def _load_file(self, scene: Scene) -> None:
         self._own_file = own = OwnFile(scene, self.settings.timestep)
-        self.scene, self.model, self.data = scene, own.model, own.data
-        self.prepared = None
+        self.model, self.data = own.model, own.data
         self._q = self._v = np.array([], dtype=int)
         self._body_ids = own.roots
         deviations = (*self.info.deviations, *own.deviations())
         vars(self)["info"] = replace(self.info, deviations=deviations)  # of this world alone
 
     def _build(self, scene: Scene) -> None:
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         self.model = model = build(scene, self.prepared, self.settings)
         self.data = data = mujoco.MjData(model)
-        self.scene = scene
 
         joints = [model.joint(name) for name in (scene.robot.joint_names if scene.robot else ())]
         self._q = np.array([joint.qposadr[0] for joint in joints], dtype=int)
@@ -122,7 +110,6 @@ class MuJoCo(Simulator):
         for at, body in zip(self._body_v, scene.free_bodies, strict=True):
             data.qvel[at] = body.linear_velocity
             data.qvel[at + 3] = body.pose.rotation().T @ body.angular_velocity  # in its own frame
-        for at, body in zip(self._body_v, scene.free_bodies, strict=True):
             if body.damping.any():
                 model.dof_damping[at] = body.linear_damping * body.mass
                 model.dof_damping[at + 3] = body.angular_damping * body.inertia()
@@ -144,19 +131,16 @@ class MuJoCo(Simulator):
         if self._own_file is not None:
             return self._own_file.numbers()
         model, prepared = self.model, self.prepared
+        links = () if prepared is None else prepared.links
+        joints = () if prepared is None else prepared.robot.joint_names
         return Numbers(
             model.geom("ground").id,
             {
-                body.name: [
-                    model.geom(f"{body.name}/{k}" if k else body.name).id
-                    for k in range(len(body.parts))
-                ]
+                body.name: [model.geom(shape_label(body, k)).id for k in range(len(body.parts))]
                 for body in self.scene.bodies
             },
-            {} if prepared is None else {name: model.body(name).id for name in prepared.links},
-            {}
-            if prepared is None
-            else {name: model.joint(name).id for name in prepared.robot.joint_names},
+            {name: model.body(name).id for name in links},
+            {name: model.joint(name).id for name in joints},
         )
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.carried import CARRIED
-from pytest_simbench.scene import Compound, FloatArray, Pose, Scene
+from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.pose import quaternion_product
 from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
 
-from .readback import Numbers, ReadBack, contact_forces
+from .readback import Numbers, Part, ReadBack, contact_forces
 from .reading import Reading
 
 mujoco = lazy_import("mujoco")
@@ -131,40 +131,38 @@ class FileReadBack(ReadBack):
     """Reads the quantities of a scene from its file's model."""
 
     def __init__(self, simulator: Any, own: OwnFile) -> None:
-        super().__init__(simulator, own.model, own.data, own.numbers())
         self.own = own
+        super().__init__(simulator, own.model, own.data, own.numbers())
 
     def world(self) -> dict[str, Any]:
         found = super().world()
-        if self.own.reading.ground is None:
-            return {name: value for name, value in found.items() if "ground/" not in name}
         found["ground/height"] += self.own.reading.lift
         return found
 
-    def body(self, prefix: str, name: str) -> dict[str, Any]:
-        found = super().body(prefix, name)
-        found[f"{prefix}/pose"][2] += self.own.reading.lift
+    def all(self) -> dict[str, Any]:
+        if self.own.reading.ground is not None:
+            return super().all()
+        return {name: value for name, value in super().all().items() if "ground/" not in name}
+
+    def pose(self, part: Part) -> FloatArray:
+        found = super().pose(part)
+        found[2] += self.own.reading.lift
         return found
 
-    def _placed(self, name: str) -> tuple[int, FloatArray, FloatArray]:
-        placed = self.own.placed[name]
+    def _body(self, body: Body) -> Part:
+        placed = self.own.placed[body.name]
         root = Pose.from_array([*self.data.xpos[placed.root], *self.data.xquat[placed.root]])
         frame = root * placed.frame
-        return placed.root, np.asarray(frame.position), frame.rotation()
+        place = np.asarray(frame.position)
+        return Part(placed.root, self.at.boxes[body.name], place, frame.rotation())
 
-    def _inertial(
-        self, prefix: str, body: int, place: FloatArray, turn: FloatArray
-    ) -> dict[str, Any]:
+    def inertial(self, part: Part) -> dict[str, Any]:
         """Of the body and all that is fixed on it."""
-        found = super()._inertial(prefix, body, place, turn)
-        mass, centre, tensor = self.own.reading.inertial(body)
-        axes = turn.T @ self.data.xmat[body].reshape(3, 3)
-        away = self.data.xpos[body] - place
-        return found | {
-            f"{prefix}/mass": mass,
-            f"{prefix}/com": axes @ centre + turn.T @ away,
-            f"{prefix}/inertia": axes @ tensor @ axes.T,
+        mass, centre, tensor = self.own.reading.inertial(part.body)
+        axes = part.turn.T @ self.data.xmat[part.body].reshape(3, 3)
+        away = self.data.xpos[part.body] - part.place
+        return super().inertial(part) | {
+            "mass": mass,
+            "com": axes @ centre + part.turn.T @ away,
+            "inertia": axes @ tensor @ axes.T,
         }
-
-    def _geoms(self, name: str) -> list[int]:
-        return [] if name == "ground" and self.at.ground < 0 else super()._geoms(name)

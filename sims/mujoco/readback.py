@@ -4,21 +4,23 @@ MuJoCo's adapter and Newton's share it."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from pytest_simbench.description.shapes import (
-    box_corners,
+    NO_REACH,
+    box_reach,
     cylinder_reach,
-    outlines,
+    placed,
     reach,
     round_reach,
 )
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import Body, FloatArray, Pose
+from pytest_simbench.scene.pose import quaternion_of
 from pytest_simbench.simulator import heavy, lazy_import
 
 from .bounces import bounce
@@ -44,11 +46,26 @@ class Numbers:
     joints: Mapping[str, int]
 
 
+@dataclass(frozen=True)
+class Part:
+    """The ground, a body or a link.
+
+    Attributes:
+        body: MuJoCo's number of what it is a part of; 0: the world.
+        geoms: numbers of its shapes.
+        place, turn: of its frame in the world, (3,) [m] and (3, 3).
+    """
+
+    body: int
+    geoms: list[int]
+    place: FloatArray
+    turn: FloatArray
+
+
 class ReadBack(readback.ReadBack):
     """Reads the quantities of `parity.quantities` from a model and the state of `data`."""
 
     def __init__(self, simulator: Any, model: Any, data: Any, at: Numbers) -> None:
-        super().__init__(simulator)
         self.model, self.at = model, at
         self.off = {name for name in _OFF if _flag(model.opt.disableflags, f"mjDSBL_{name}")}
         self.overridden = _flag(model.opt.enableflags, "mjENBL_OVERRIDE")
@@ -59,15 +76,19 @@ class ReadBack(readback.ReadBack):
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
         mujoco.mj_comVel(model, self.data)
+        scene = simulator.scene
+        super().__init__(
+            simulator,
+            Part(0, [at.ground] if at.ground >= 0 else [], np.zeros(3), np.eye(3)),
+            {body.name: self._body(body) for body in scene.bodies},
+            {name: self._link(body) for name, body in at.links.items()},
+        )
 
     def world(self) -> dict[str, Any]:
-        ground = self.at.ground
         return {
             "gravity": np.zeros(3) if "GRAVITY" in self.off else self.model.opt.gravity,
             "timestep": self.model.opt.timestep,
-            "ground/height": self.data.geom_xpos[ground, 2],
-            "ground/friction": self._friction([ground]),
-            "ground/restitution": self._restitution([ground]),
+            "ground/height": self.data.geom_xpos[self.at.ground, 2],
         }
 
     def closures(self) -> list[FloatArray]:
@@ -76,34 +97,33 @@ class ReadBack(readback.ReadBack):
     def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
         return all(map(self._coupled, pairs))
 
-    def body(self, prefix: str, name: str) -> dict[str, Any]:
-        model, geoms = self.model, self.at.boxes[name]
-        body, place, turn = self._placed(name)
-        light = self.model.body_mass[body] < heavy(self.scene)  # else it moves as prescribed
-        free = light and self._can_move(body)
-        found = self._surface(prefix, geoms, place, turn)
-        found[f"{prefix}/dynamic"] = float(free)
+    def body(self, part: Part, name: str) -> dict[str, Any]:
+        model, body = self.model, part.body
+        light = model.body_mass[body] < heavy(self.scene)  # else it moves as prescribed
+        found: dict[str, Any] = {"dynamic": float(light and self._can_move(body))}
         if model.body_dofnum[body] and light:
-            found |= self._inertial(prefix, body, place, turn)
-            found[f"{prefix}/velocity"] = self._velocity(body)
+            found |= self.inertial(part) | {"velocity": self._velocity(body)}
             dof = model.body_dofadr[body] + np.arange(6)
             passive = np.ravel(model.dof_damping[dof])[:6]
-            found[f"{prefix}/damping"] += [
+            found["damping"] += [
                 passive[:3].max() / model.body_mass[body],
                 passive[3:].max() / model.body_inertia[body].max(),
             ]
         return found
 
-    def _placed(self, name: str) -> tuple[int, FloatArray, FloatArray]:
-        """Number, place and turn of a scene's body. A fixed one may have none of its own: its frame
-        is then its shape's."""
-        geom = self.at.boxes[name][0]
-        body = int(self.model.geom_bodyid[geom])
-        if body == 0:
-            place, turn = self._frame(geom)
-            first = self.scene.body(name).parts[0].pose.inverse()
-            return body, place + turn @ first.position, turn @ first.rotation()
-        return body, self.data.xpos[body], self.data.xmat[body].reshape(3, 3)
+    def _link(self, body: int) -> Part:
+        geoms = np.flatnonzero(self.model.geom_bodyid == body).tolist()
+        return Part(body, geoms, self.data.xpos[body], self.data.xmat[body].reshape(3, 3))
+
+    def _body(self, body: Body) -> Part:
+        """A fixed one may have no frame of its own: it is then where its first shape has it."""
+        geoms = self.at.boxes[body.name]
+        number = int(self.model.geom_bodyid[geoms[0]])
+        if number == 0:
+            place, turn = self._frame(geoms[0])
+            first = body.parts[0].pose.inverse()
+            return Part(0, geoms, place + turn @ first.position, turn @ first.rotation())
+        return replace(self._link(number), geoms=geoms)
 
     def _frame(self, geom: int) -> tuple[FloatArray, FloatArray]:
         """Place and turn of a body's frame: its shape's, but for a mesh, whose corners MuJoCo moves
@@ -117,74 +137,55 @@ class ReadBack(readback.ReadBack):
         turn = turn @ own.reshape(3, 3).T
         return place - turn @ model.mesh_pos[mesh], turn
 
-    def link(self, prefix: str, name: str) -> dict[str, Any]:
-        body = self.at.links[name]
-        place, turn = self.data.xpos[body], self.data.xmat[body].reshape(3, 3)
-        geoms = np.flatnonzero(self.model.geom_bodyid == body).tolist()
-        found = self._surface(prefix, geoms, place, turn)
-        if self.model.body_dofnum[body]:
-            found |= self._inertial(prefix, body, place, turn)
-        return found
+    def pose(self, part: Part) -> FloatArray:
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, part.turn.ravel())
+        return np.concatenate([part.place, quaternion])
 
-    def _surface(
-        self, prefix: str, geoms: list[int], place: FloatArray, turn: FloatArray
-    ) -> dict[str, Any]:
-        """Pose, shapes and surface of what `geoms` belong to, whose frame is at place and turn."""
-        model, quaternion = self.model, np.empty(4)
-        mujoco.mju_mat2Quat(quaternion, turn.ravel())
-        found: dict[str, Any] = {f"{prefix}/pose": np.concatenate([place, quaternion])}
-        kinds: tuple[list[FloatArray], ...] = ([], [], [])
-        for geom in geoms:
-            kind = mujoco.mjtGeom(model.geom_type[geom])
-            if kind.name[len("mjGEOM_") :] in _ROUND:
-                kinds[2].append(self._round(geom, place, turn))
-            else:
-                mesh = kind == mujoco.mjtGeom.mjGEOM_MESH
-                kinds[int(mesh)].append(reach((self._corners(geom) - place) @ turn))
-        found |= outlines(prefix, *kinds)
-        if geoms:
-            found[f"{prefix}/friction"] = self._friction(geoms)
-            found[f"{prefix}/restitution"] = self._restitution(geoms)
-            margins = model.opt.o_margin if self.overridden else model.geom_margin[geoms]
-            found[f"{prefix}/margin"] = one_value(margins)
-        return found
+    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
+        for geom in part.geoms:
+            place = part.turn.T @ (self.data.geom_xpos[geom] - part.place)
+            turn = part.turn.T @ self.data.geom_xmat[geom].reshape(3, 3)
+            yield self._shape(geom, Pose.from_array([*place, *quaternion_of(turn)]))
 
-    def _round(self, geom: int, place: FloatArray, turn: FloatArray) -> FloatArray:
-        """The reach of a sphere, cylinder or capsule in the frame at place and turn."""
-        model, quaternion = self.model, np.empty(4)
-        mujoco.mju_mat2Quat(quaternion, (turn.T @ self.data.geom_xmat[geom].reshape(3, 3)).ravel())
-        centre = turn.T @ (self.data.geom_xpos[geom] - place)
-        pose, (radius, half, _) = Pose.from_array([*centre, *quaternion]), model.geom_size[geom]
-        kind = model.geom_type[geom]
-        if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-            return cylinder_reach(radius, 2 * half, pose)
-        return round_reach(radius, 2 * half * (kind == mujoco.mjtGeom.mjGEOM_CAPSULE), pose)
+    def _shape(self, geom: int, pose: Pose) -> tuple[str, FloatArray]:
+        radius, half, _ = size = self.model.geom_size[geom]
+        match mujoco.mjtGeom(self.model.geom_type[geom]).name:
+            case "mjGEOM_BOX":
+                return "boxes", box_reach(2 * size, pose)
+            case "mjGEOM_SPHERE":
+                return "rounds", round_reach(radius, 0.0, pose)
+            case "mjGEOM_CAPSULE":
+                return "rounds", round_reach(radius, 2 * half, pose)
+            case "mjGEOM_CYLINDER":
+                return "rounds", cylinder_reach(radius, 2 * half, pose)
+            case "mjGEOM_MESH":
+                mesh = self.model.geom_dataid[geom]
+                first = self.model.mesh_vertadr[mesh]
+                points = self.model.mesh_vert[first : first + self.model.mesh_vertnum[mesh]]
+                return "meshes", reach(placed(points.astype(float), pose))
+        return "boxes", NO_REACH
 
-    def _corners(self, geom: int) -> FloatArray:
-        """Corners of a box or a mesh in the world, (n, 3)."""
-        model = self.model
-        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
-            mesh = model.geom_dataid[geom]
-            first = model.mesh_vertadr[mesh]
-            points = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
-        elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
-            points = box_corners(2 * model.geom_size[geom])
-        else:
-            points = np.full((1, 3), np.nan)  # no scene has such a shape
-        return points @ self.data.geom_xmat[geom].reshape(3, 3).T + self.data.geom_xpos[geom]
+    def surface(self, part: Part) -> dict[str, Any]:
+        model, geoms = self.model, part.geoms
+        return {
+            "friction": self._friction(geoms),
+            "restitution": self._restitution(geoms),
+            "margin": one_value(
+                model.opt.o_margin if self.overridden else model.geom_margin[geoms]
+            ),
+        }
 
-    def _inertial(
-        self, prefix: str, body: int, place: FloatArray, turn: FloatArray
-    ) -> dict[str, Any]:
-        model = self.model
-        axes = turn.T @ self.data.ximat[body].reshape(3, 3)
+    def inertial(self, part: Part) -> dict[str, Any]:
+        model, body = self.model, part.body
+        axes = part.turn.T @ self.data.ximat[body].reshape(3, 3)
         medium = model.opt.viscosity + model.opt.density + np.abs(model.opt.wind).sum()
         return {
-            f"{prefix}/mass": model.body_mass[body],
-            f"{prefix}/com": turn.T @ (self.data.xipos[body] - place),
-            f"{prefix}/inertia": axes @ np.diag(model.body_inertia[body]) @ axes.T,
-            f"{prefix}/damping": np.full(2, medium),
-            f"{prefix}/gravity": 1.0 - model.body_gravcomp[body],
+            "mass": model.body_mass[body],
+            "com": part.turn.T @ (self.data.xipos[body] - part.place),
+            "inertia": axes @ np.diag(model.body_inertia[body]) @ axes.T,
+            "damping": np.full(2, medium),
+            "gravity": 1.0 - model.body_gravcomp[body],
         }
 
     def _velocity(self, body: int) -> FloatArray:
@@ -225,30 +226,17 @@ class ReadBack(readback.ReadBack):
         ends = {*model.eq_obj1id[held], *model.eq_obj2id[held]}
         return bool(model.body_dofnum[body] == 6 and body not in ends)
 
-    def can_touch(self, a: str, b: str) -> bool:
-        """Of two links whether any shapes can, which none shall; else whether all can."""
-        model = self.model
-        first, second = self._geoms(a), self._geoms(b)
-        if not (first and second):
-            return False
-        kinds = model.geom_contype[first][:, None] & model.geom_conaffinity[second]
-        kinds |= model.geom_conaffinity[first][:, None] & model.geom_contype[second]
-        low, high = sorted(int(model.geom_bodyid[geoms[0]]) for geoms in (first, second))
+    def collide(self, first: Part, second: Part) -> Any:
+        model, (a, b) = self.model, np.ix_(first.geoms, second.geoms)
+        if not (a.size and b.size):
+            return ()
+        low, high = sorted(int(model.geom_bodyid[geoms.flat[0]]) for geoms in (a, b))
+        kinds = model.geom_contype[a] & model.geom_conaffinity[b]
+        kinds |= model.geom_conaffinity[a] & model.geom_contype[b]
         excluded = (low << 16) + high in model.exclude_signature
-        if excluded or self.off & {"CONTACT", "CONSTRAINT"}:
-            return False
-        links = a.startswith("link/") and b.startswith("link/")
-        return bool(kinds.any() if links else kinds.all())
+        return kinds * (not excluded and not self.off & {"CONTACT", "CONSTRAINT"})
 
-    def _geoms(self, name: str) -> list[int]:
-        kind, _, rest = name.partition("/")
-        if kind == "ground":
-            return [self.at.ground]
-        if kind == "body":
-            return self.at.boxes[rest]
-        return np.flatnonzero(self.model.geom_bodyid == self.at.links[rest]).tolist()
-
-    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+    def joint(self, name: str) -> dict[str, Any]:
         model, joint = self.model, self.at.joints[name]
         dof = model.jnt_dofadr[joint]
         axis, still = model.jnt_axis[joint], np.zeros(3)
@@ -267,40 +255,29 @@ class ReadBack(readback.ReadBack):
         ends = [abs(end) for range_, limited in ranges if limited for end in range_]
         spring = np.ravel(model.jnt_stiffness[joint])[0]
         return {
-            f"{prefix}/axis": np.concatenate([still, axis] if slides else turning),
-            f"{prefix}/limits": limits,
-            f"{prefix}/effort_limit": one_value(ends or np.inf),
-            f"{prefix}/stiffness": spring
-            + drives * one_value([gain[0] * gear, -bias[1] * gear**2]),
-            f"{prefix}/damping": np.ravel(model.dof_damping[dof])[0] - drives * bias[2] * gear**2,
-            f"{prefix}/friction": model.dof_frictionloss[dof],
-            f"{prefix}/armature": model.dof_armature[dof],
-            f"{prefix}/initial_position": self.data.qpos[model.jnt_qposadr[joint]],
+            "axis": np.concatenate([still, axis] if slides else turning),
+            "limits": limits,
+            "effort_limit": one_value(ends or np.inf),
+            "stiffness": spring + drives * one_value([gain[0] * gear, -bias[1] * gear**2]),
+            "damping": np.ravel(model.dof_damping[dof])[0] - drives * bias[2] * gear**2,
+            "friction": model.dof_frictionloss[dof],
+            "armature": model.dof_armature[dof],
+            "initial_position": self.data.qpos[model.jnt_qposadr[joint]],
         }
 
     def _coupled(self, fingers: tuple[str, str]) -> bool:
         """Whether an active constraint holds two fingers at equal positions."""
         model, joints = self.model, {self.at.joints[name] for name in fingers}
+        found = np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_JOINT) & self.active)
         return any(
-            {a, b} == joints
-            and kind == mujoco.mjtEq.mjEQ_JOINT
-            and active
-            and list(data[:5]) == [0, 1, 0, 0, 0]
-            for a, b, kind, active, data in zip(
-                model.eq_obj1id,
-                model.eq_obj2id,
-                model.eq_type,
-                self.active,
-                model.eq_data,
-                strict=True,
-            )
+            {model.eq_obj1id[k], model.eq_obj2id[k]} == joints
+            and list(model.eq_data[k, :5]) == [0, 1, 0, 0, 0]
+            for k in found
         )
 
 
 _OFF = ("GRAVITY", "CONTACT", "CONSTRAINT", "EQUALITY", "LIMIT", "ACTUATION")
 """What can be switched off as a whole, and is looked for."""
-
-_ROUND = ("SPHERE", "CYLINDER", "CAPSULE")
 
 
 def _flag(flags: int, name: str) -> bool:

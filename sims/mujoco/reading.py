@@ -389,24 +389,19 @@ class Reading:
             CARRIED,
             f"{_values(np.array(sorted(self.scene.frictions)))}; of two surfaces the larger counts",
         )
-        seen = [
-            g for g in range(model.ngeom) if not (model.geom_contype | model.geom_conaffinity)[g]
-        ]
-        if seen:
+        masks = np.stack([model.geom_contype, model.geom_conaffinity], axis=1)
+        if seen := np.flatnonzero(~masks.any(axis=1)).tolist():
             names = (self.name("geom", geom) for geom in seen)
             self.tell("geom (visual)", NOT_CARRIED, "it cannot collide; its mass counts", names)
-        fixed = [g for g in [*self.solid, self.ground] if g is not None]
-        masks = {(int(model.geom_contype[g]), int(model.geom_conaffinity[g])) for g in fixed}
-        moving = {
-            (int(model.geom_contype[g]), int(model.geom_conaffinity[g]))
-            for p in self.placed if p.root for g in p.geoms
-        }  # fmt: skip
-        if any(not (a[0] & b[1] or a[1] & b[0]) for a in moving for b in masks):
+        moving = masks[[g for p in self.placed if p.root for g in p.geoms]]
+        masks = masks[[g for g in [*self.solid, self.ground] if g is not None]]
+        meet = (moving[:, None] & masks[:, ::-1]).any(axis=2)
+        if not meet.all():
             self.tell(
                 "geom contype, conaffinity",
                 NOT_CARRIED,
                 "some pairs do not collide in the file; here all bodies collide with each other: "
-                f"{_values(np.array(sorted(masks)))}",
+                f"{_values(masks)}",
             )
 
     def _tell_options(self) -> None:

@@ -108,7 +108,7 @@ def _add_body(spec: Any, part: Body, settings: MuJoCoSettings, most: float) -> N
         name=part.name, pos=part.pose.position, quat=part.pose.quaternion
     )
     geoms = [
-        _add_shape(spec, body, f"{part.name}/{k}" if k else part.name, shape, settings)
+        _add_shape(spec, body, shape_label(part, k), shape, settings)
         for k, shape in enumerate(part.parts)
     ]
     if part.prescribed:
@@ -124,6 +124,11 @@ def _add_body(spec: Any, part: Body, settings: MuJoCoSettings, most: float) -> N
         if part.moments is not None or isinstance(part, ConvexMesh):
             _set_inertia(body, part.mass, part.inertia().tolist())
         body.add_freejoint(name=f"{part.name}/free")
+
+
+def shape_label(body: Body, k: int) -> str:
+    """Name of a body's shape with this number, here and in Newton."""
+    return f"{body.name}/{k}" if k else body.name
 
 
 def _add_shape(spec: Any, body: Any, name: str, shape: Body, settings: MuJoCoSettings) -> Any:

@@ -13,7 +13,7 @@ drive. Joint 1 of the Panda then gains 58 % of the momentum that its effort limi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,9 +23,6 @@ from pytest_simbench.scene import Body, FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
-    PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     heavy,
@@ -35,9 +32,9 @@ from pytest_simbench.simulator import (
 from ..mujoco.bounces import BOUNCES, direct
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
-from ..mujoco.world import leave_out
+from ..mujoco.world import leave_out, shape_label
 from .settings import CHOSEN_ON, PROFILES, NewtonSettings
-from .world import build_model, make_solver, names, shape_label
+from .world import build_model, make_solver, names
 
 LED = 1 << 20
 """Collision group of prescribed bodies, which Newton gives nobody."""
@@ -50,7 +47,7 @@ mujoco = lazy_import("mujoco")
 class Newton(Simulator):
     """Adapter of Newton."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="newton",
         title="Newton",
         distribution="newton",
@@ -89,8 +86,8 @@ class Newton(Simulator):
         install_size_mb=900,
         environment=DISABLED,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: NewtonSettings
 
     _compiled: ClassVar[set[bool]] = set()
@@ -108,10 +105,9 @@ class Newton(Simulator):
             Newton._compiled.add(kind)
 
     def load(self, scene: Scene) -> None:
+        self.begin(scene)
         wp.config.log_level = wp.LOG_WARNING
-        self.scene = scene
         self._viewer: Any = None
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         self.model = build_model(scene, self.prepared, self.settings)
         self._number(scene)
         self.solver = make_solver(self.model, self.prepared, self.settings)
@@ -120,7 +116,6 @@ class Newton(Simulator):
         self._control = self.model.control()
         ctrl = self._control.mujoco.ctrl if scene.robot is not None else None
         self._ctrl: Any = None if ctrl is None else ctrl.numpy()  # a view: the device is the CPU
-        self._steps = 0
         for state in self._states:
             newton.eval_fk(self.model, self.model.joint_q, self.model.joint_qd, state)
         self._show_mujoco_the_start()

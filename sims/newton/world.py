@@ -20,6 +20,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import
 
+from ..mujoco.world import shape_label
 from .settings import NewtonSettings
 
 newton = lazy_import("newton")
@@ -130,11 +131,6 @@ def _add_body(builder: Any, part: Body, surface: Any, most: float) -> None:
         builder.joint_qd[start : start + 6] = map(float, part.velocity)
     for k, shape in enumerate(part.parts):
         _add_shape(builder, body, shape, pose * shape.pose, surface, shape_label(part, k))
-
-
-def shape_label(body: Body, k: int) -> str:
-    """Of a body's shape with this number."""
-    return f"{body.name}/{k}" if k else body.name
 
 
 def _add_shape(builder: Any, body: int, part: Body, pose: Pose, surface: Any, label: str) -> None:

@@ -8,9 +8,8 @@ What was learnt stands in docs/engines/ode.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +20,6 @@ from pytest_simbench.simulator import (
     Deviation,
     NotSupportedError,
     PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     lazy_import,
@@ -44,33 +41,16 @@ SEED = 0
 """Of ODE's own random numbers, by which quickStep shuffles its rows; 0 is where they begin."""
 
 
-@dataclass(frozen=True)
-class State:
-    """What a run goes on from.
-
-    Attributes:
-        steps: since loading.
-        bodies: position, linear and angular velocity of each body.
-        rotations: of each body.
-        awake: whether each body is.
-        turns: of each joint, see `Axis`.
-        commanded: the drives' set points.
-        seed: of ODE's random numbers.
-    """
-
-    steps: int
-    bodies: list[tuple[Any, ...]]
-    rotations: list[tuple[bytes, bytes]]
-    awake: list[bool]
-    turns: list[tuple[float, ...]]
-    commanded: tuple[FloatArray, FloatArray, FloatArray] | None
-    seed: int
+State = tuple[int, list[Any], list[tuple[bytes, bytes]], list[bool], list[Any], Any, int]
+"""What a run goes on from: steps since loading; of each body position and velocities, rotation, and
+whether it is awake; turns of each joint, see `Axis`; the drives' set points; seed of ODE's random
+numbers."""
 
 
 class ODE(Simulator):
     """Adapter of ODE."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="ode",
         title="Open Dynamics Engine",
         distribution="Py3ODE",
@@ -98,14 +78,14 @@ class ODE(Simulator):
         ),
         install_size_mb=40,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: ODESettings
 
     def load(self, scene: Scene) -> None:
         _check_hand(scene)
-        self.scene, s = scene, self.settings
-        self._steps = 0
+        self.begin(scene)
+        s = self.settings
         library().dRandSetSeed(SEED)
         self.world = world = ode.World()
         world.setGravity(scene.gravity)
@@ -129,9 +109,7 @@ class ODE(Simulator):
         self._axes: dict[str, Axis] = {}
         self._closures: list[Any] = []
         self._drives: Drives | None = None
-        self.prepared = None
-        if scene.robot is not None:
-            self.prepared = PreparedRobot(scene.robot)
+        if self.prepared is not None:
             self._load_robot(self.prepared)
         links = [part.body for part in self._links.values() if part.body is not None]
         self._moving = [*self._free, *links]
@@ -205,25 +183,25 @@ class ODE(Simulator):
         awake = [bool(body.isEnabled()) for body in self._moving]
         turns = [tuple(axis.turn) for axis in self._axes.values()]
         seed = library().dRandGetSeed()
-        return State(self._steps, bodies, rotations, awake, turns, commanded, seed)
+        return self._steps, bodies, rotations, awake, turns, commanded, seed
 
     def restore(self, state: State) -> None:
-        self._steps = state.steps
+        self._steps, bodies, rotations, awake, turns, commanded, seed = state
         self.contacts.clear()
         self.contacts.settle()  # else the order of contacts is that of what went before
-        for name, rotation in zip(self._names, state.rotations, strict=True):
+        for name, rotation in zip(self._names, rotations, strict=True):
             turn(name, *rotation)
-        for body, values, awake in zip(self._moving, state.bodies, state.awake, strict=True):
+        for body, values, woken in zip(self._moving, bodies, awake, strict=True):
             position, linear, angular = values
             body.setPosition(position)
             body.setLinearVel(linear)
             body.setAngularVel(angular)
-            body.enable() if awake else body.disable()
-        for axis, turns in zip(self._axes.values(), state.turns, strict=True):
-            axis.turn[:] = turns
-        if self._drives is not None and state.commanded is not None:
-            self._drives.command(*state.commanded)
-        library().dRandSetSeed(state.seed)
+            body.enable() if woken else body.disable()
+        for axis, turn_ in zip(self._axes.values(), turns, strict=True):
+            axis.turn[:] = turn_
+        if self._drives is not None and commanded is not None:
+            self._drives.command(*commanded)
+        library().dRandSetSeed(seed)
 
     def joint_wrenches(self) -> FloatArray:
         if self.prepared is None:

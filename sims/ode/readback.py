@@ -5,17 +5,16 @@ ODE tells no corners of a mesh, so each is measured: a plane is moved towards it
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from pytest_simbench.description.shapes import (
     DIRECTIONS,
-    box_corners,
+    box_reach,
     cylinder_reach,
-    outlines,
     placed,
-    reach,
     round_reach,
 )
 from pytest_simbench.parity import readback
@@ -24,17 +23,7 @@ from pytest_simbench.simulator import lazy_import
 
 from .axes import Axis
 from .contacts import Part
-from .library import (
-    HI_STOP,
-    LO_STOP,
-    MOST_FORCE,
-    SOFTNESS,
-    Convex,
-    Mesh,
-    damping,
-    library,
-    pose_of,
-)
+from .library import HI_STOP, LO_STOP, MOST_FORCE, SOFTNESS, Convex, Mesh, damping, library, pose_of
 
 ode = lazy_import("ode")
 
@@ -43,38 +32,27 @@ class ReadBack(readback.ReadBack):
     """Reads the quantities of `parity.quantities` that ODE tells."""
 
     def __init__(self, simulator: Any) -> None:
-        super().__init__(simulator)
+        super().__init__(simulator, simulator._ground, simulator._bodies, simulator._links)
         self.made, self.timestep = simulator.world, simulator.settings.timestep
-        self.ground, self.bodies, self.links = (
-            simulator._ground, simulator._bodies, simulator._links,
-        )  # fmt: skip
         self.axes, self.drives = simulator._axes, simulator._drives
         self.contacts, self.loops = simulator.contacts, simulator._closures
         self.probe = ode.GeomPlane(None, (0.0, 0.0, 1.0), 0.0)
+        self.first = {id(self.bodies[b.name]): b.parts[0].pose for b in self.scene.bodies}
 
     def world(self) -> dict[str, Any]:
         (_, _, up), height = self.ground.geoms[0].getParams()
         return {
             "gravity": self.made.getGravity(),
             "timestep": self.timestep,
-            "ground/friction": self.ground.surface.friction,
-            "ground/restitution": self.ground.surface.bounce,
             "ground/height": height / up,
         }
 
-    def body(self, prefix: str, name: str) -> dict[str, Any]:
-        part = self.bodies[name]
-        first = self.scene.body(name).parts[0].pose
-        found = self._part(prefix, part, first)
-        free = part.body is not None and not part.body.isKinematic()
-        if free:
-            found[f"{prefix}/velocity"] = [*part.body.getLinearVel(), *part.body.getAngularVel()]
-        held = free and part.body.getNumJoints() > self.contacts.on(part.body)
-        found[f"{prefix}/dynamic"] = float(free and not held)
-        return found
-
-    def link(self, prefix: str, name: str) -> dict[str, Any]:
-        return self._part(prefix, self.links[name])
+    def body(self, part: Part, name: str) -> dict[str, Any]:
+        if part.body is None or part.body.isKinematic():
+            return {"dynamic": 0.0}
+        velocity = [*part.body.getLinearVel(), *part.body.getAngularVel()]
+        held = part.body.getNumJoints() > self.contacts.on(part.body)
+        return {"dynamic": float(not held), "velocity": velocity, **self.inertial(part)}
 
     def closures(self) -> list[FloatArray]:
         return [self._points(joint) for joint in self.loops]
@@ -82,28 +60,27 @@ class ReadBack(readback.ReadBack):
     def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
         return bool(self.drives.pinion.holds if self.drives.pinion else not pairs)
 
-    def _part(self, prefix: str, part: Part, first: Pose | None = None) -> dict[str, Any]:
-        """Pose, shapes, surface and inertia of a body or link; `first`: of a body, the pose of its
-        first shape in its frame."""
+    def pose(self, part: Part) -> FloatArray:
+        return self._frame(part).as_array()
+
+    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
         frame = self._frame(part)
-        if part.body is None and first is not None:
-            frame *= first.inverse()
-        found: dict[str, Any] = {f"{prefix}/pose": frame.as_array()}
-        meshes = [self._measured(geom, frame) for geom in part.geoms if isinstance(geom, _FACETED)]
-        boxes = [
-            reach(placed(box_corners(geom.getLengths()), frame.inverse() * pose_of(geom)))
-            for geom in part.geoms
-            if isinstance(geom, ode.GeomBox)
-        ]
-        others = (geom for geom in part.geoms if not isinstance(geom, (*_FACETED, ode.GeomBox)))
-        rounds = [_round(geom, frame.inverse() * pose_of(geom)) for geom in others]
-        found |= outlines(prefix, boxes, meshes, rounds)
-        if part.geoms:
-            found[f"{prefix}/friction"] = part.surface.friction
-            found[f"{prefix}/restitution"] = part.surface.bounce
-        if part.body is not None and not part.body.isKinematic():
-            found |= self._inertial(prefix, part)
-        return found
+        for geom in part.geoms:
+            if isinstance(geom, Mesh | Convex):
+                yield "meshes", self._measured(geom, frame)
+                continue
+            pose = frame.inverse() * pose_of(geom)
+            if isinstance(geom, ode.GeomBox):
+                yield "boxes", box_reach(geom.getLengths(), pose)
+            elif isinstance(geom, ode.GeomSphere):
+                yield "rounds", round_reach(geom.getRadius(), 0.0, pose)
+            else:
+                reached = cylinder_reach if isinstance(geom, ode.GeomCylinder) else round_reach
+                radius, length = geom.getParams()
+                yield "rounds", reached(radius, length, pose)
+
+    def surface(self, part: Part) -> dict[str, Any]:
+        return {"friction": part.surface.friction, "restitution": part.surface.bounce}
 
     def _points(self, joint: Any) -> FloatArray:
         """Of a closure, in the frames of its links, (2, 3)."""
@@ -118,21 +95,23 @@ class ReadBack(readback.ReadBack):
         )
 
     def _frame(self, part: Part) -> Pose:
-        """The scene's frame of a body or link, in the world."""
+        """The scene's frame of a body or link, in the world; of a fixed body as its first shape has
+        it."""
         if part.body is not None:
-            return _pose(part.body) * part.frame
-        if part in self.bodies.values():
-            return pose_of(part.geoms[0])
+            place = [*part.body.getPosition(), *part.body.getQuaternion()]
+            return Pose.from_array(place) * part.frame
+        if id(part) in self.first:
+            return pose_of(part.geoms[0]) * self.first[id(part)].inverse()
         return part.frame
 
-    def _inertial(self, prefix: str, part: Part) -> dict[str, Any]:
+    def inertial(self, part: Part) -> dict[str, Any]:
         mass, frame = part.body.getMass(), part.frame.inverse()
         return {
-            f"{prefix}/mass": mass.mass,
-            f"{prefix}/com": placed(np.array([mass.c]), frame)[0],
-            f"{prefix}/inertia": frame.rotation() @ np.array(mass.I) @ frame.rotation().T,
-            f"{prefix}/gravity": float(part.body.getGravityMode()),
-            f"{prefix}/damping": damping(part.body) / self.timestep,
+            "mass": mass.mass,
+            "com": placed(np.array([mass.c]), frame)[0],
+            "inertia": frame.rotation() @ np.array(mass.I) @ frame.rotation().T,
+            "gravity": float(part.body.getGravityMode()),
+            "damping": damping(part.body) / self.timestep,
         }
 
     def _measured(self, mesh: Mesh | Convex, frame: Pose) -> FloatArray:
@@ -152,46 +131,35 @@ class ReadBack(readback.ReadBack):
             reaches.append(offset - origin @ direction)
         return np.array(reaches)
 
-    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+    def joint(self, name: str) -> dict[str, Any]:
         axis, drives = self.axes[name], self.drives
         joint = axis.joint
         limits = np.array([axis.stops.getParam(LO_STOP), axis.stops.getParam(HI_STOP)])
         resistance = 1 / joint.getParam(SOFTNESS)
         stiffness = resistance * drives.gain(axis)
         found: dict[str, Any] = {
-            f"{prefix}/axis": _motion(axis, self._frame(self._child(axis))),
-            f"{prefix}/limits": limits + axis.zero,
-            f"{prefix}/initial_position": axis.position(),
-            f"{prefix}/effort_limit": joint.getParam(MOST_FORCE),
-            f"{prefix}/stiffness": stiffness,
-            f"{prefix}/damping": resistance - self.timestep * stiffness,
-            f"{prefix}/armature": 0.0,
+            "axis": _motion(axis, self._frame(self._child(axis))),
+            "limits": limits + axis.zero,
+            "initial_position": axis.position(),
+            "effort_limit": joint.getParam(MOST_FORCE),
+            "stiffness": stiffness,
+            "damping": resistance - self.timestep * stiffness,
+            "armature": 0.0,
         }
         if name in drives.rotors:
             softness = drives.rotors[name].motor.getParam(SOFTNESS)
-            found[f"{prefix}/armature"] = self.timestep / softness
+            found["armature"] = self.timestep / softness
         elif drives.pinion is not None and axis in drives.pinion.fingers:
-            found[f"{prefix}/armature"] = drives.pinion.inertia / len(drives.pinion.fingers)
+            found["armature"] = drives.pinion.inertia / len(drives.pinion.fingers)
         return found
 
     def _child(self, axis: Axis) -> Part:
         return next(part for part in self.links.values() if part.body is axis.child)
 
-    def can_touch(self, a: str, b: str) -> bool:
-        one, other = self._named(a), self._named(b)
-        if frozenset((id(one.surface), id(other.surface))) in self.contacts.apart:
-            return False
-        pairs = [(x, y) for x in one.geoms for y in other.geoms]
-        return all(_collide(x._id(), y._id()) for x, y in pairs)
-
-    def _named(self, name: str) -> Part:
-        kind, _, rest = name.partition("/")
-        if kind == "ground":
-            return self.ground
-        return self.bodies[rest] if kind == "body" else self.links[rest]
-
-
-_FACETED = (Mesh, Convex)
+    def collide(self, first: Part, second: Part) -> Any:
+        if frozenset((id(first.surface), id(second.surface))) in self.contacts.apart:
+            return ()
+        return [[_collide(x._id(), y._id()) for y in second.geoms] for x in first.geoms]
 
 
 def _collide(x: int, y: int) -> bool:
@@ -200,19 +168,6 @@ def _collide(x: int, y: int) -> bool:
     wanted = tell.dGeomGetCategoryBits(x) & tell.dGeomGetCollideBits(y)
     wanted |= tell.dGeomGetCategoryBits(y) & tell.dGeomGetCollideBits(x)
     return bool(wanted and tell.dGeomIsEnabled(x) and tell.dGeomIsEnabled(y))
-
-
-def _round(geom: Any, pose: Pose) -> FloatArray:
-    """The reach of a sphere, cylinder or capsule at a pose."""
-    if isinstance(geom, ode.GeomSphere):
-        return round_reach(geom.getRadius(), 0.0, pose)
-    radius, length = geom.getParams()
-    pillar = isinstance(geom, ode.GeomCylinder)
-    return (cylinder_reach if pillar else round_reach)(radius, length, pose)
-
-
-def _pose(body: Any) -> Pose:
-    return Pose.from_array([*body.getPosition(), *body.getQuaternion()])
 
 
 def _motion(axis: Axis, frame: Pose) -> FloatArray:

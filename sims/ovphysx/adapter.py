@@ -18,8 +18,8 @@ not quite that of the uninterrupted run.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +30,6 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     NotSupportedError,
-    PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     lazy_import,
@@ -51,7 +48,7 @@ _Saved = tuple[int, dict[str, NDArray[np.float32]], tuple[FloatArray, FloatArray
 class OvPhysX(Simulator):
     """Adapter of Omniverse PhysX."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="ovphysx",
         title="Omniverse PhysX",
         distribution="ovphysx",
@@ -123,13 +120,12 @@ class OvPhysX(Simulator):
         caches={"WARP_CACHE_PATH": "warp"},
         install_size_mb=1100,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: OvPhysXSettings
 
     def load(self, scene: Scene) -> None:
-        self.scene = scene
-        self.prepared = PreparedRobot(scene.robot) if scene.robot is not None else None
+        self.begin(scene)
         self._text = usd.Stage(scene, self.prepared, _attributes(self.settings)).text()
         self._start()
         self._free = [usd.body_path(i) for i, box in enumerate(scene.bodies) if not box.fixed]
@@ -169,6 +165,17 @@ class OvPhysX(Simulator):
             found = self._bindings[kind] = binding, np.zeros(binding.shape, np.float32)
         return found
 
+    def _read(self, kind: str) -> NDArray[np.float32]:
+        """What a binding tells, until it is asked again."""
+        binding, buffer = self._binding(kind)
+        binding.read(buffer)
+        return buffer
+
+    def _write(self, kind: str, values: FloatArray | NDArray[np.float32]) -> None:
+        binding, buffer = self._binding(kind)
+        buffer[:] = values
+        binding.write(buffer)
+
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._targets = position + effort / self._stiffness, velocity
         if self._steps > 0:
@@ -185,9 +192,7 @@ class OvPhysX(Simulator):
         if self._steps == 0:
             self.session.write("RIGID_BODY", "wrench", dict(zip(self._free, rows, strict=True)))
         else:
-            binding, buffer = self._binding("RIGID_BODY_WRENCH")
-            buffer[:] = rows
-            binding.write(buffer)
+            self._write("RIGID_BODY_WRENCH", rows)
 
     def lead(self, before: FloatArray, after: FloatArray) -> None:
         rows = self._still | dict(zip(self._led, after, strict=True))
@@ -217,9 +222,7 @@ class OvPhysX(Simulator):
                 row[:] = np.concatenate([values[name][path] for name in names])
         else:
             for kind, columns in (("POSE", slice(0, 7)), ("VELOCITY", slice(7, 13))):
-                binding, buffer = self._binding(f"RIGID_BODY_{kind}")
-                binding.read(buffer)
-                state[:, columns] = buffer
+                state[:, columns] = self._read(f"RIGID_BODY_{kind}")
         state[:, 3:7] = state[:, [6, 3, 4, 5]]
         return state
 
@@ -233,18 +236,16 @@ class OvPhysX(Simulator):
                 row[:] = [values[name][path][0] for path in self._joints] * self._unit
             return state
         for row, kind in zip(state, ("POSITION", "VELOCITY"), strict=True):
-            binding, buffer = self._binding(f"ARTICULATION_DOF_{kind}")
-            binding.read(buffer)
-            row[:] = buffer[0, self._columns]
+            row[:] = self._read(f"ARTICULATION_DOF_{kind}")[0, self._columns]
         return state
 
     def joint_wrenches(self) -> FloatArray:
         if self.prepared is None or self._steps == 0:  # nothing was transmitted so far
             return np.zeros((len(self._joints), 6))
-        binding, buffer = self._binding("ARTICULATION_LINK_INCOMING_JOINT_FORCE")
-        binding.read(buffer)
-        order = [binding.body_names.index(f"link_{k}") for k in range(len(self.prepared.links))]
-        return wrenches(buffer[0, order].astype(float), self.prepared, self.joint_state()[0])
+        kind = "ARTICULATION_LINK_INCOMING_JOINT_FORCE"
+        told, names = self._read(kind)[0], self._binding(kind)[0].body_names
+        order = [names.index(f"link_{k}") for k in range(len(self.prepared.links))]
+        return wrenches(told[order].astype(float), self.prepared, self.joint_state()[0])
 
     def read_back(self) -> dict[str, Any]:
         return ReadBack(self).all()
@@ -261,11 +262,8 @@ class OvPhysX(Simulator):
                 yield names[first], names[second], wrench
 
     def save(self) -> _Saved:
-        values = {}
-        for kind in self._state_kinds() if self._steps > 0 else ():
-            binding, buffer = self._binding(kind)
-            binding.read(buffer)
-            values[kind] = buffer.copy()
+        kinds = self._state_kinds() if self._steps > 0 else ()
+        values = {kind: self._read(kind).copy() for kind in kinds}
         return self._steps, values, self._targets
 
     def restore(self, state: _Saved) -> None:
@@ -274,9 +272,7 @@ class OvPhysX(Simulator):
         if steps > 0:
             self.step()
         for kind, saved in values.items():
-            binding, buffer = self._binding(kind)
-            buffer[:] = saved
-            binding.write(buffer)
+            self._write(kind, saved)
         self._steps, self._targets = steps, targets
         if targets is not None and steps > 0:
             self._write_targets(targets)

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pytest_simbench.description.links import link_poses
-from pytest_simbench.description.shapes import (
-    DIRECTIONS,
-    OUTLINES,
-    box_corners,
-    order_of,
-    outlines,
-    reach,
-)
+from pytest_simbench.description.shapes import DIRECTIONS, box_corners, reach
+from pytest_simbench.description.urdf import Link
 from pytest_simbench.parity import readback
+from pytest_simbench.parity.quantities import kind_of
 from pytest_simbench.parity.readback import one_value
-from pytest_simbench.scene import Body, Box, ConvexMesh, FloatArray, Pose
+from pytest_simbench.scene import Body, Box, FloatArray, Pose
 from pytest_simbench.simulator import PreparedRobot
 
 from . import stage as usd
@@ -42,7 +38,39 @@ _JOINT = {
 """Of a joint: the quantity that an attribute is, and the power of the session's unit in it."""
 
 _PASSIVE = ("jointStaticFriction", "jointDynamicFriction", "jointViscousFriction")
-_Values = Mapping[str, Mapping[str, FloatArray]]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A body or link.
+
+    Attributes:
+        path: its prim.
+        values: what PhysX tells of all prims of its kind, by attribute and prim.
+        made: whose it is: the scene's, which says where its shapes are to be looked for.
+    """
+
+    path: str
+    values: Mapping[str, Mapping[str, Any]]
+    made: Body | Link
+
+    def told(self, attribute: str) -> Any:
+        return self.values[attribute][self.path]
+
+    def of_shapes(self, attribute: str) -> FloatArray:
+        """An attribute of all its shapes."""
+        return np.atleast_1d(self.told(attribute))[: self.count]
+
+    @property
+    def count(self) -> int:
+        """Of its shapes."""
+        return int(self.told("shapeCount"))
+
+    @property
+    def pose(self) -> Pose:
+        """In the world."""
+        x, y, z, w = self.told("orientation")
+        return Pose.from_array([*self.told("position"), w, x, y, z])
 
 
 class ReadBack(readback.ReadBack):
@@ -53,99 +81,96 @@ class ReadBack(readback.ReadBack):
     """
 
     def __init__(self, simulator: Any) -> None:
-        super().__init__(simulator)
         self.session, self.units = simulator.session, simulator._unit
         self.places = {} if simulator._steps else simulator._placed
-        self.bodies = self.session.read("RIGID_BODY", *_ATTRIBUTES)
-        if self.prepared is not None:
-            self.links = self.session.read("ARTICULATION_LINK", *_ATTRIBUTES)
+        values = self.session.read("RIGID_BODY", *_ATTRIBUTES)
+        bodies, links = enumerate(simulator.scene.bodies), {}
+        if simulator.prepared is not None:
+            links = _links(self.session, simulator.prepared)
             self.joints = self.session.read("ARTICULATION_JOINT", *_JOINT, *_PASSIVE)
-            self.axes = _axes(self.session, self.prepared)
+            self.axes = _axes(self.session, simulator.prepared, links)
+        super().__init__(
+            simulator,
+            None,
+            {body.name: Part(usd.body_path(k), values, body) for k, body in bodies},
+            links,
+        )
 
     def world(self) -> dict[str, Any]:
         return {"ground/height": self.session.height(usd.GROUND)}
 
-    def body(self, prefix: str, name: str) -> dict[str, Any]:
-        box, values = self.scene.body(name), self.bodies
-        path = usd.body_path(self.scene.bodies.index(box))
-        pose = _pose(values, path)
-        if isinstance(box, Box):  # rays tell the size of a box more exactly
+    def pose(self, part: Part) -> FloatArray:
+        return part.pose.as_array()
+
+    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
+        path, made, pose = part.path, part.made, part.pose
+        if isinstance(made, Link):
+            place = self.places.get(made.name, pose)
+            for k, shape in enumerate(made.shapes[: part.count]):
+                reached = self.session.reach(f"{path}/shape_{k}", place, shape.pose)
+                yield "meshes" if shape.size is None else "boxes", reached
+        elif isinstance(made, Box) and part.count:  # rays tell the size of a box more exactly
             size = self.session.size(f"{path}/{usd.shape_name(0)}", pose)
-            outline = outlines(prefix, [reach(box_corners(size))], [])
+            yield "boxes", reach(box_corners(size))
         else:
-            outline = self._swept(prefix, box, path, pose, int(values["shapeCount"][path]))
-        found = _part(values, path, prefix) | outline
-        if box.mass:
-            found |= _inertial(values, path, prefix)
-            velocity = [values[name][path] for name in ("linearVelocity", "angularVelocity")]
-            found[f"{prefix}/velocity"] = np.concatenate(velocity)
-        return found
+            for k, solid in enumerate(made.parts[: part.count]):
+                reached = self.session.reach(f"{path}/{usd.shape_name(k)}", pose, solid.pose)
+                yield kind_of(solid), reached
 
-    def _swept(
-        self, prefix: str, body: Body, path: str, pose: Pose, count: int
-    ) -> dict[str, FloatArray]:
-        """The outlines of the first shapes of a body. They are ordered as the scene's: an error of
-        0.05 mm would order thin walls otherwise each time."""
-        kinds: dict[str, list[tuple[FloatArray, FloatArray]]] = {name: [] for name in OUTLINES}
-        of = {Box.kind: "boxes", ConvexMesh.kind: "meshes"}
-        for k, part in enumerate(body.parts[:count]):
-            swept = self.session.reach(f"{path}/{usd.shape_name(k)}", pose, part.pose)
-            kinds[of.get(part.kind, "rounds")].append((swept, part.reach_placed(DIRECTIONS)))
-        found = {}
-        for kind, pairs in kinds.items():
-            order = order_of([asked for _, asked in pairs])
-            rows = np.array([pairs[k][0] for k in order])
-            found[f"{prefix}/{kind}"] = rows.reshape(-1, len(DIRECTIONS))
-        return found
+    def asked(self, part: Part) -> list[FloatArray] | None:
+        """Of a body: an error of 0.05 mm would order thin walls otherwise each time."""
+        if isinstance(part.made, Link):
+            return None
+        return [solid.reach_placed(DIRECTIONS) for solid in part.made.parts[: part.count]]
 
-    def link(self, prefix: str, name: str) -> dict[str, Any]:
-        path, values = usd.link_path(list(self.prepared.links).index(name)), self.links
-        kinds: tuple[list[FloatArray], list[FloatArray]] = ([], [])
-        place = self.places[name] if self.places else _pose(values, path)
-        shapes = self.prepared.links[name].shapes[: int(values["shapeCount"][path])]
-        for k, shape in enumerate(shapes):
-            found = self.session.reach(f"{path}/shape_{k}", place, shape.pose)
-            kinds[shape.size is None].append(found)
-        part = _part(values, path, prefix) | outlines(prefix, *kinds)
-        return part if name == self.prepared.root else part | _inertial(values, path, prefix)
+    def surface(self, part: Part | None) -> dict[str, Any]:
+        """Nothing is told of the ground's."""
+        if part is None:
+            return {}
+        return {
+            "friction": one_value([part.of_shapes(name) for name in _FRICTIONS]),
+            "restitution": one_value(part.of_shapes("restitution")),
+            "margin": one_value(part.of_shapes("restOffset")),
+        }
 
-    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+    def inertial(self, part: Part) -> dict[str, Any]:
+        return {
+            "mass": part.told("mass"),
+            "com": part.told("centerOfMassPosition"),
+            "inertia": part.told("inertia").reshape(3, 3),
+            "gravity": float(not (part.told("disableSimulation") or part.told("disableGravity"))),
+        }
+
+    def body(self, part: Part, name: str) -> dict[str, Any]:
+        if not self.scene.body(name).mass:
+            return {}
+        velocity = [part.told("linearVelocity"), part.told("angularVelocity")]
+        return {"velocity": np.concatenate(velocity), **self.inertial(part)}
+
+    def joint(self, name: str) -> dict[str, Any]:
         number, values = self.prepared.robot.joint_names.index(name), self.joints
         path, unit = usd.joint_path(number), self.units[number]
         found = {
-            f"{prefix}/{quantity}": values[attribute][path][0] * unit**power
+            quantity: values[attribute][path][0] * unit**power
             for attribute, (quantity, power) in _JOINT.items()
         }
-        found[f"{prefix}/friction"] = sum(abs(values[kind][path][0]) for kind in _PASSIVE)
-        return found | {f"{prefix}/axis": self.axes[path]}
+        found["friction"] = sum(abs(values[kind][path][0]) for kind in _PASSIVE)
+        return found | {"axis": self.axes[name]}
 
     def touches(self) -> dict[str, Any]:
         return {}
 
 
-def _part(values: _Values, path: str, prefix: str) -> dict[str, Any]:
-    """Pose and surface of a body or link."""
-    found: dict[str, Any] = {f"{prefix}/pose": _pose(values, path).as_array()}
-    if values["shapeCount"][path]:
-        frictions = [_each_shape(values, name, path) for name in _FRICTIONS]
-        found[f"{prefix}/friction"] = one_value(frictions)
-        found[f"{prefix}/restitution"] = one_value(_each_shape(values, "restitution", path))
-        found[f"{prefix}/margin"] = one_value(_each_shape(values, "restOffset", path))
-    return found
+def _links(session: Session, prepared: PreparedRobot) -> dict[str, Part]:
+    values = session.read("ARTICULATION_LINK", *_ATTRIBUTES)
+    links = enumerate(prepared.links.values())
+    return {link.name: Part(usd.link_path(k), values, link) for k, link in links}
 
 
-def _inertial(values: _Values, path: str, prefix: str) -> dict[str, Any]:
-    moved = not (values["disableSimulation"][path] or values["disableGravity"][path])
-    return {
-        f"{prefix}/mass": values["mass"][path],
-        f"{prefix}/com": values["centerOfMassPosition"][path],
-        f"{prefix}/inertia": values["inertia"][path].reshape(3, 3),
-        f"{prefix}/gravity": float(moved),
-    }
-
-
-def _axes(session: Session, prepared: PreparedRobot) -> dict[str, FloatArray]:
-    """Motion subspace of each joint by its prim, from PhysX's Jacobian.
+def _axes(
+    session: Session, prepared: PreparedRobot, links: Mapping[str, Part]
+) -> dict[str, FloatArray]:
+    """Motion subspace of each joint by its name, from PhysX's Jacobian.
 
     Its rows are, for each moving link, velocity of the centre of mass and angular velocity in the
     world; a link is in the place of its own joint's column.
@@ -153,32 +178,15 @@ def _axes(session: Session, prepared: PreparedRobot) -> dict[str, FloatArray]:
     order = session.dof_joints()
     jacobian = session.read("ARTICULATION", "jacobian")["jacobian"][usd.ROOT]
     blocks = np.reshape(jacobian, (len(order), 6, len(order)))
-    links = session.read("ARTICULATION_LINK", "position", "orientation", "centerOfMassPosition")
-    names = list(prepared.links)
-    child = {
-        usd.joint_path(prepared.robot.joint_names.index(j.name)): names.index(j.child)
-        for j in prepared.joints
-    }
     axes = {}
-    for k, joint in enumerate(order):
-        path = usd.link_path(child[joint])
-        turn = _pose(links, path).rotation().T
+    for joint in prepared.joints:
+        link = links[joint.child]
+        k = order.index(usd.joint_path(prepared.robot.joint_names.index(joint.name)))
+        turn = link.pose.rotation().T
         speed, spin = turn @ blocks[k, :3, k], turn @ blocks[k, 3:, k]
-        axes[joint] = np.concatenate(
-            [spin, speed - np.cross(spin, links["centerOfMassPosition"][path])]
-        )
+        centre = link.told("centerOfMassPosition")
+        axes[joint.name] = np.concatenate([spin, speed - np.cross(spin, centre)])
     return axes
-
-
-def _pose(values: _Values, path: str) -> Pose:
-    x, y, z, w = values["orientation"][path]
-    return Pose.from_array([*values["position"][path], w, x, y, z])
-
-
-def _each_shape(values: _Values, attribute: str, path: str) -> FloatArray:
-    """An attribute of all shapes of a prim."""
-    count = int(values["shapeCount"][path])
-    return np.atleast_1d(values[attribute][path])[:count]
 
 
 def wrenches(told: FloatArray, prepared: PreparedRobot, positions: FloatArray) -> FloatArray:

@@ -88,9 +88,7 @@ class Session:
     def read(self, kind: str, *attributes: str) -> dict[str, dict[str, FloatArray]]:
         """Attributes of all objects of a kind (`SimObjectType`), by attribute and prim path."""
         found: dict[str, dict[str, FloatArray]] = {name: {} for name in attributes}
-        target = getattr(ovphysx_types.SimObjectType, kind)
-        scope = ovphysx_types.ObjectScope.ALL
-        with self.physx.read_sync(target, list(attributes), scope=scope) as result:
+        with self._reading(kind, attributes) as result:
             for group in result.groups:
                 paths = result.dictionary.get_path_strings(group.prim_list)
                 columns = [np.array(tensor.numpy(), dtype=float) for tensor in group.tensors]
@@ -99,14 +97,17 @@ class Session:
                 found[name].update(zip(paths, rows, strict=True))
         return found
 
+    def _reading(self, kind: str, attributes: Sequence[str]) -> Any:
+        target = getattr(ovphysx_types.SimObjectType, kind)
+        scope = ovphysx_types.ObjectScope.ALL
+        return self.physx.read_sync(target, list(attributes), scope=scope)
+
     def contacts(self) -> dict[tuple[str, str], list[tuple[FloatArray, FloatArray]]]:
         """What two prims do to each other in the last step: an impulse [N s] on the first of a pair
         and where it acts [m], for each point of contact and each anchor of friction."""
         found: dict[tuple[str, str], list[tuple[FloatArray, FloatArray]]] = {}
-        target = ovphysx_types.SimObjectType.CONTACT_SENSOR
-        scope = ovphysx_types.ObjectScope.ALL
         values: dict[str, dict[str, Any]] = {name: {} for name in _EVENTS}
-        with self.physx.read_sync(target, list(_EVENTS), scope=scope) as result:
+        with self._reading("CONTACT_SENSOR", _EVENTS) as result:
             for group in result.groups:
                 paths = result.dictionary.get_path_strings(group.prim_list)
                 arrays = [np.array(tensor.numpy()) for tensor in group.tensors]
@@ -193,9 +194,7 @@ class Session:
 
     def dof_joints(self) -> list[str]:
         """Prim paths of the articulation's joints in the order of the Jacobian's columns."""
-        target = ovphysx_types.SimObjectType.ARTICULATION
-        scope = ovphysx_types.ObjectScope.ALL
-        with self.physx.read_sync(target, ["dofJointPath"], scope=scope) as result:
+        with self._reading("ARTICULATION", ["dofJointPath"]) as result:
             handles = np.array(result.groups[0].tensors[0].numpy(), dtype=np.uint64).ravel()
             return [result.dictionary.path_to_string(int(handle)) for handle in handles]
 

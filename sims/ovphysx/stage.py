@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.links import reduced
+from pytest_simbench.description.stl import read_stl
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape
 from pytest_simbench.scene import (
     Body,
@@ -211,7 +212,7 @@ class Stage:
         name, surface = f"shape_{index}", self._surface(friction)
         if shape.size is not None:
             return usd.prim("Cube", name, _COLLIDER, [*usd.cube(shape.size, shape.pose), *surface])
-        triangles = usd.read_stl(Path(str(shape.mesh)))
+        triangles = read_stl(Path(str(shape.mesh)).read_bytes())
         corners, faces = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
         lines = [*usd.placed(shape.pose), *usd.hull(corners, faces.reshape(-1, 3))]
         return usd.prim("Mesh", name, _HULL, [*lines, *surface])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,20 +10,6 @@ from numpy.typing import NDArray
 
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.scene.pose import quaternion_of
-
-
-def read_stl(path: Path) -> FloatArray:
-    """Triangles of a binary STL file, (n, 3, 3) [m].
-
-    Raises:
-        ValueError: the file is no binary STL.
-    """
-    data = path.read_bytes()
-    count = int.from_bytes(data[80:84], "little")
-    if len(data) != 84 + 50 * count:
-        raise ValueError(f"{path} is no binary STL file")
-    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")])
-    return np.asarray(np.frombuffer(data, kind, offset=84)["corners"], dtype=float)
 
 
 def turn_from_x(axis: FloatArray) -> tuple[float, float, float, float]:

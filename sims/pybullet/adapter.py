@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,6 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     heavy,
@@ -44,7 +42,7 @@ pybullet = lazy_import("pybullet")
 class PyBullet(Simulator):
     """Adapter of PyBullet."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="pybullet",
         title="PyBullet",
         distribution="pybullet",
@@ -98,13 +96,12 @@ class PyBullet(Simulator):
         ),
         install_size_mb=100,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: PyBulletSettings
 
     def load(self, scene: Scene) -> None:
-        self.scene = scene
-        self._steps = 0
+        self.begin(scene)
         self._commanded: tuple[FloatArray, ...] | None = None
         s = self.settings
         options = "--width=1024 --height=768" if self.gui else ""
@@ -134,15 +131,13 @@ class PyBullet(Simulator):
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[body.name] for body in scene.prescribed_bodies]
         self._part_from_still(scene)
-        self.prepared = None
         self._robot = -1
         self._anchors: Anchors | None = None
         self._couplings: list[int] = []
         self._closures: list[int] = []
         self._joints: list[int] = []
         self._links: dict[str, int] = {}
-        if scene.robot is not None:
-            self.prepared = PreparedRobot(scene.robot)
+        if self.prepared is not None:
             self._load_robot(self.prepared)
 
     def _part_from_still(self, scene: Scene) -> None:

@@ -6,75 +6,66 @@ and led back to the frames of the description here.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import (
-    box_corners,
-    cylinder_reach,
-    outlines,
-    placed,
-    reach,
-    round_reach,
-)
+from pytest_simbench.description.shapes import box_reach, cylinder_reach, placed, reach, round_reach
 from pytest_simbench.parity import readback
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import
 
-from .world import points, pose_of
+from .world import inertial_frame, points, pose_of
 
 pybullet = lazy_import("pybullet")
+
+
+Part = tuple[int, int]
+"""Bullet's numbers of a body and of a link of it, -1 for its base."""
 
 
 class ReadBack(readback.ReadBack):
     """Reads the quantities of `parity.quantities` that Bullet tells."""
 
     def __init__(self, simulator: Any) -> None:
-        super().__init__(simulator)
-        self.c, self.ground, self.bodies = simulator.client, simulator._ground, simulator._bodies
-        self.robot, self.links, self.joints = simulator._robot, simulator._links, simulator._joints
+        self.c, self.robot, self.joints = simulator.client, simulator._robot, simulator._joints
+        super().__init__(
+            simulator,
+            (simulator._ground, -1),
+            {name: (number, -1) for name, number in simulator._bodies.items()},
+            {name: (self.robot, number) for name, number in simulator._links.items()},
+        )
         self.couplings, self.loops = simulator._couplings, simulator._closures
         self.held = self._held()
 
     def world(self) -> dict[str, Any]:
         engine = pybullet.getPhysicsEngineParameters(physicsClientId=self.c)
-        ground = self._dynamics(self.ground)
-        place, _ = pybullet.getBasePositionAndOrientation(self.ground, physicsClientId=self.c)
+        place, _ = pybullet.getBasePositionAndOrientation(self.ground[0], physicsClientId=self.c)
         return {
             "gravity": [engine[f"gravityAcceleration{axis}"] for axis in "XYZ"],
             "timestep": engine["fixedTimeStep"],
             "ground/height": place[2],
-            "ground/friction": ground[1] ** 2,
-            "ground/restitution": ground[5] ** 2,
         }
 
-    def body(self, prefix: str, name: str) -> dict[str, Any]:
-        body = self.bodies[name]
+    def body(self, part: Part, name: str) -> dict[str, Any]:
         # else fixed, or it moves as prescribed
-        free = 0 < self._dynamics(body)[0] < heavy(self.scene)
-        found = self._part(prefix, body, -1)
+        free = 0 < self._dynamics(part)[0] < heavy(self.scene)
+        found: dict[str, Any] = {"dynamic": float(free and part[0] not in self.held)}
         if free:
-            found |= self._inertial(prefix, body, -1)
-            velocity = pybullet.getBaseVelocity(body, physicsClientId=self.c)
-            found[f"{prefix}/velocity"] = np.concatenate(velocity)
-        found[f"{prefix}/dynamic"] = float(free and body not in self.held)
+            velocity = pybullet.getBaseVelocity(part[0], physicsClientId=self.c)
+            found |= self.inertial(part) | {"velocity": np.concatenate(velocity)}
         return found
 
-    def link(self, prefix: str, name: str) -> dict[str, Any]:
-        link = self.links[name]
-        found = self._part(prefix, self.robot, link)
-        return found | self._inertial(prefix, self.robot, link) if link >= 0 else found
-
-    def joint(self, prefix: str, name: str) -> dict[str, Any]:
+    def joint(self, name: str) -> dict[str, Any]:
         joint = self.joints[self.prepared.robot.joint_names.index(name)]
         info = pybullet.getJointInfo(self.robot, joint, physicsClientId=self.c)
         state = pybullet.getJointState(self.robot, joint, physicsClientId=self.c)
         return {
-            f"{prefix}/limits": info[8:10],
-            f"{prefix}/friction": info[6] + info[7],  # a motor has no damping besides
-            f"{prefix}/initial_position": state[0],
-            f"{prefix}/axis": self._axis(joint),
+            "limits": info[8:10],
+            "friction": info[6] + info[7],  # a motor has no damping besides
+            "initial_position": state[0],
+            "axis": self._axis(joint),
         }
 
     def closures(self) -> list[FloatArray]:
@@ -83,57 +74,47 @@ class ReadBack(readback.ReadBack):
     def touches(self) -> dict[str, Any]:
         return {}
 
-    def _part(self, prefix: str, body: int, link: int) -> dict[str, Any]:
-        """Pose, shapes and surface of a body or link."""
-        dynamics, inertial = self._dynamics(body, link), self._inertial_frame(body, link)
-        boxes, meshes, rounds = self._shapes(body, link)
-        place = self._centre(body, link) * inertial.inverse()
-        found: dict[str, Any] = {f"{prefix}/pose": place.as_array()}
-        corners = ([reach(placed(points, inertial)) for points in kind] for kind in (boxes, meshes))
-        outline = [*corners, rounds]
-        found |= outlines(prefix, *outline)
-        if boxes or meshes or rounds:
-            found[f"{prefix}/friction"] = dynamics[1] ** 2
-            found[f"{prefix}/restitution"] = dynamics[5] ** 2
-            found[f"{prefix}/margin"] = dynamics[11] - self._thickness(body, link)
-        return found
+    def pose(self, part: Part) -> FloatArray:
+        return self._frame(part).as_array()
 
-    def _inertial(self, prefix: str, body: int, link: int) -> dict[str, Any]:
-        dynamics, inertial = self._dynamics(body, link), self._inertial_frame(body, link)
-        axes = inertial.rotation()
+    def surface(self, part: Part) -> dict[str, Any]:
+        dynamics = self._dynamics(part)
         return {
-            f"{prefix}/mass": dynamics[0],
-            f"{prefix}/com": inertial.position,
-            f"{prefix}/inertia": axes @ np.diag(dynamics[2]) @ axes.T,
+            "friction": dynamics[1] ** 2,
+            "restitution": dynamics[5] ** 2,
+            "margin": dynamics[11] - self._thickness(part),
         }
 
-    def _shapes(self, body: int, link: int) -> tuple[list[FloatArray], ...]:
-        """Corners (n, 3) of each box and of each mesh, in the inertial frame; and the reach of each
-        sphere, cylinder and capsule, which only bodies have."""
-        rounds: list[FloatArray] = []
-        boxes: list[FloatArray] = []
-        meshes: list[FloatArray] = []
-        data = pybullet.getCollisionShapeData(body, link, physicsClientId=self.c)
-        for k, (_, _, kind, size, _, place, turn) in enumerate(data):
-            if kind == pybullet.GEOM_BOX:
-                boxes.append(placed(box_corners(size), pose_of(place, turn)))
-            elif kind == pybullet.GEOM_SPHERE:
-                rounds.append(round_reach(size[0], 0.0, pose_of(place, turn)))
-            elif kind == pybullet.GEOM_CAPSULE:
-                rounds.append(round_reach(size[1], size[0], pose_of(place, turn)))
-            elif kind == pybullet.GEOM_CYLINDER:
-                rounds.append(cylinder_reach(size[1], size[0], pose_of(place, turn)))
-            else:  # Bullet's own corners, already in the inertial frame
-                mesh = pybullet.getMeshData(
-                    body, link, collisionShapeIndex=k, physicsClientId=self.c
-                )
-                meshes.append(np.reshape(mesh[1], (-1, 3)) if mesh[0] else np.full((1, 3), np.nan))
-        return boxes, meshes, rounds
+    def inertial(self, part: Part) -> dict[str, Any]:
+        dynamics, inertial = self._dynamics(part), inertial_frame(self.c, *part)
+        axes = inertial.rotation()
+        return {
+            "mass": dynamics[0],
+            "com": inertial.position,
+            "inertia": axes @ np.diag(dynamics[2]) @ axes.T,
+        }
 
-    def _thickness(self, body: int, link: int) -> float:
+    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
+        inertial = inertial_frame(self.c, *part)
+        for k, (_, _, kind, size, _, place, turn) in enumerate(self._shapes(part)):
+            pose = inertial * pose_of(place, turn)
+            if kind == pybullet.GEOM_BOX:
+                yield "boxes", box_reach(size, pose)
+            elif kind == pybullet.GEOM_SPHERE:
+                yield "rounds", round_reach(size[0], 0.0, pose)
+            elif kind == pybullet.GEOM_CAPSULE:
+                yield "rounds", round_reach(size[1], size[0], pose)
+            elif kind == pybullet.GEOM_CYLINDER:
+                yield "rounds", cylinder_reach(size[1], size[0], pose)
+            else:  # Bullet's own corners, already in the inertial frame
+                mesh = pybullet.getMeshData(*part, collisionShapeIndex=k, physicsClientId=self.c)
+                corners = np.reshape(mesh[1], (-1, 3)) if mesh[0] else np.full((1, 3), np.nan)
+                yield "meshes", reach(placed(corners, inertial))
+
+    def _thickness(self, part: Part) -> float:
         """Radius of a sphere or capsule, which are a point and a line to Bullet, their margin the
         rest [m]; else 0."""
-        data = pybullet.getCollisionShapeData(body, link, physicsClientId=self.c)
+        data = self._shapes(part)
         kind, size, _, place, turn = data[0][2:7]
         if len(data) > 1 or any([*place, *turn[:3]]):  # Bullet tells the margin of the compound
             return 0.0
@@ -153,8 +134,7 @@ class ReadBack(readback.ReadBack):
         linear, angular = pybullet.calculateJacobian(
             self.robot, joint, [0.0] * 3, positions, rest, rest, physicsClientId=self.c
         )
-        frame = self._centre(self.robot, joint) * self._inertial_frame(self.robot, joint).inverse()
-        turn = frame.rotation().T
+        turn = self._frame((self.robot, joint)).rotation().T
         return np.concatenate(
             [turn @ np.array(angular)[:, column], turn @ np.array(linear)[:, column]]
         )
@@ -178,21 +158,21 @@ class ReadBack(readback.ReadBack):
             held |= {info[0], info[2]}
         return held
 
-    def _dynamics(self, body: int, link: int = -1) -> Any:
-        return pybullet.getDynamicsInfo(body, link, physicsClientId=self.c)
+    def _dynamics(self, part: Part) -> Any:
+        return pybullet.getDynamicsInfo(*part, physicsClientId=self.c)
 
-    def _inertial_frame(self, body: int, link: int) -> Pose:
-        """In the frame of the body or link."""
-        dynamics = self._dynamics(body, link)
-        return pose_of(dynamics[3], dynamics[4])
+    def _shapes(self, part: Part) -> Any:
+        return pybullet.getCollisionShapeData(*part, physicsClientId=self.c)
 
-    def _centre(self, body: int, link: int) -> Pose:
-        """The inertial frame in the world."""
-        c = self.c
+    def _frame(self, part: Part) -> Pose:
+        """Of a body or link, in the world."""
+        c, (body, link) = self.c, part
         if link < 0:
-            return pose_of(*pybullet.getBasePositionAndOrientation(body, physicsClientId=c))
-        state = pybullet.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=c)
-        return pose_of(state[0], state[1])
+            centre = pybullet.getBasePositionAndOrientation(body, physicsClientId=c)
+        else:
+            state = pybullet.getLinkState(body, link, computeForwardKinematics=1, physicsClientId=c)
+            centre = state[:2]
+        return pose_of(*centre) * inertial_frame(self.c, *part).inverse()
 
 
 def wrench(client: int, robot: int, joint: int, subspace: FloatArray) -> FloatArray:

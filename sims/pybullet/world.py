@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import tempfile
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.shapes import write_stl
-from pytest_simbench.description.urdf import INERTIA, write_origin
+from pytest_simbench.description.urdf import body_urdf
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -79,44 +78,26 @@ def _make_body(c: int, box: Body, mass: float) -> int:
 
 
 def _load_compound(c: int, body: Compound, mass: float) -> int:
-    """A body of several shapes, by a URDF: of a list PyBullet takes 16, and drops the others."""
-    root = ET.Element("robot", name="compound")
-    link = ET.SubElement(root, "link", name="compound")
-    inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "mass", value=repr(float(mass)))
-    ET.SubElement(
-        inertial, "inertia", {name: "1" if name[1] == name[2] else "0" for name in INERTIA}
-    )
+    """A body of several shapes, by a URDF: of a list PyBullet takes 16, and drops the others. Its
+    meshes are STL files: Bullet tells no corners of an OBJ among other shapes."""
     w, x, y, z = body.pose.quaternion
     with tempfile.TemporaryDirectory() as folder:
-        for k, part in enumerate(body.parts):
-            for kind in ("collision", "visual"):
-                element = ET.SubElement(link, kind)
-                write_origin(element, part.pose)
-                _describe(ET.SubElement(element, "geometry"), part, Path(folder) / f"{k}.stl")
-            colour = ET.SubElement(element, "material", name=str(k))
-            ET.SubElement(colour, "color", rgba=" ".join(map(str, body.colour)))
-        ET.ElementTree(root).write(f"{folder}/compound.urdf")
+        path = Path(folder) / "compound.urdf"
+        text = body_urdf(
+            body.changed(prescribed=False, mass=mass or 1.0, moments=(1.0,) * 3),
+            lambda name, hull: write_stl(path.with_name(f"{name}.stl"), hull),
+        )
+        path.write_text(text, encoding="utf-8")
         made: int = pybullet.loadURDF(
-            f"{folder}/compound.urdf",
+            str(path),
             body.pose.position,
             [x, y, z, w],
             useFixedBase=not mass,
             flags=pybullet.URDF_USE_IMPLICIT_CYLINDER,
             physicsClientId=c,
         )
+    pybullet.changeVisualShape(made, -1, rgbaColor=body.colour, physicsClientId=c)
     return made
-
-
-def _describe(geometry: ET.Element, shape: Body, mesh: Path) -> None:
-    """A shape in a URDF; a mesh goes to a file, an STL: Bullet tells no corners of an OBJ among
-    other shapes."""
-    if isinstance(shape, ConvexMesh):
-        ET.SubElement(geometry, "mesh", filename=str(write_stl(mesh, shape.hull)))
-    else:
-        size = {n: getattr(shape, n) for n in ("size", "radius", "length") if hasattr(shape, n)}
-        written = {n: " ".join(map(repr, np.atleast_1d(v).tolist())) for n, v in size.items()}
-        ET.SubElement(geometry, shape.kind, written)
 
 
 def set_surface(
@@ -207,22 +188,17 @@ def points(client: int, constraint: int) -> FloatArray:
     """Of a closure, in the frames of its links, (2, 3) [m]."""
     info = pybullet.getConstraintInfo(constraint, physicsClientId=client)
     body, ends = info[0], ((info[1], info[6]), (info[3], info[7]))
-    return np.array(
-        [
-            _inertial(client, body, link).rotation() @ at + _inertial(client, body, link).position
-            for link, at in ends
-        ]
-    )
+    return np.array([(inertial_frame(client, body, link) * Pose(at)).position for link, at in ends])
 
 
 def _from_centre(client: int, robot: int, link: int, point: Vector3) -> Any:
     """A point of a link in the frame that Bullet counts from, at its centre of mass."""
-    return (_inertial(client, robot, link).inverse() * Pose(point)).position
+    return (inertial_frame(client, robot, link).inverse() * Pose(point)).position
 
 
-def _inertial(client: int, robot: int, link: int) -> Pose:
-    """The inertial frame of a link in the link's frame."""
-    dynamics = pybullet.getDynamicsInfo(robot, link, physicsClientId=client)
+def inertial_frame(client: int, body: int, link: int) -> Pose:
+    """Of a link or, with -1, a body, in its frame."""
+    dynamics = pybullet.getDynamicsInfo(body, link, physicsClientId=client)
     return pose_of(dynamics[3], dynamics[4])
 
 

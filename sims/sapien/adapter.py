@@ -10,10 +10,8 @@ stiffness that its URDF loader gives a mimic joint. See docs/engines/sapien.md.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Any, ClassVar
-from xml.etree import ElementTree
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +22,6 @@ from pytest_simbench.simulator import (
     Capability,
     Deviation,
     PreparedRobot,
-    Seen,
-    Settings,
     Simulator,
     SimulatorInfo,
     lazy_import,
@@ -47,7 +43,7 @@ free body, are the first of what `PhysxCpuSystem.pack` gives, in single precisio
 class SAPIEN(Simulator):
     """Adapter of SAPIEN."""
 
-    info: ClassVar[SimulatorInfo] = SimulatorInfo(
+    info = SimulatorInfo(
         name="sapien",
         title="SAPIEN",
         distribution="sapien",
@@ -84,14 +80,12 @@ class SAPIEN(Simulator):
         ),
         install_size_mb=340,
     )
-    profiles: ClassVar[Mapping[str, Settings]] = PROFILES
-    chosen_on: ClassVar[Mapping[str, tuple[Seen, ...]]] = CHOSEN_ON
+    profiles = PROFILES
+    chosen_on = CHOSEN_ON
     settings: SAPIENSettings
 
     def load(self, scene: Scene) -> None:
-        self.scene = scene
-        self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
-        self._steps = 0
+        self.begin(scene)
         self._drawing: Drawing | None = None
         self._build(scene)
         if self.gui:
@@ -137,8 +131,8 @@ class SAPIEN(Simulator):
         loader = self._world.create_urdf_loader()
         loader.set_material(robot.friction, robot.friction, 0.0)
         with tempfile.TemporaryDirectory() as folder:
-            path = prepared.write_urdf(folder)
-            _drop_visuals(path)
+            # even to note a visual shape down needs a Vulkan device
+            path = prepared.write_urdf(folder, visuals=False)
             builder = loader.load_file_as_articulation_builder(str(path))
         touches = WORLD | ROBOT if robot.self_collide else WORLD  # never two that a joint joins
         for link in builder.link_builders:
@@ -293,12 +287,3 @@ class SAPIEN(Simulator):
         for name in list(vars(self)):
             if name.startswith("_"):
                 delattr(self, name)
-
-
-def _drop_visuals(path: Path) -> None:
-    """Take the visual shapes out of a URDF file: even to note one down needs a Vulkan device."""
-    tree = ElementTree.parse(path)
-    for link in tree.iter("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
-    tree.write(path)

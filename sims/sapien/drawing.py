@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pytest_simbench.scene import Pose, Scene, Solid
 from pytest_simbench.simulator import PreparedRobot, UnavailableError, lazy_import
-from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, view_axes
 
 sapien = lazy_import("sapien")
 rendering = lazy_import("sapien.render")
@@ -183,9 +183,6 @@ def to_sapien(pose: Pose) -> Any:
 
 def _looking() -> Any:
     """From the eye to the target; SAPIEN's cameras look along x, with z up."""
-    forward = np.subtract(LOOK_AT, EYE) / np.linalg.norm(np.subtract(LOOK_AT, EYE))
-    left = np.cross([0.0, 0.0, 1.0], forward)
-    left /= np.linalg.norm(left)
-    matrix = np.eye(4)
-    matrix[:3] = np.column_stack([forward, left, np.cross(forward, left), EYE])
+    (right, down, ahead), matrix = view_axes().T, np.eye(4)
+    matrix[:3] = np.column_stack([ahead, -right, -down, EYE])
     return sapien.Pose(matrix)

@@ -31,6 +31,14 @@ def test_reach_of_a_box() -> None:
     assert reaches[(0.577, 0.577, 0.577)] == pytest.approx(6 / np.sqrt(3))
 
 
+def test_the_order_of_shapes_does_not_matter() -> None:
+    mirrored = [reach(placed(box_corners((1, 1, 1)), Pose.at(x, 0, 0))) for x in (-2.0, 2.0)]
+    boxes = [("boxes", row) for row in mirrored]
+    first, second = outlines(boxes), outlines(boxes[::-1])
+    np.testing.assert_array_equal(first["boxes"], second["boxes"])
+    assert first["meshes"].shape == (0, 26)
+
+
 def stl_binary() -> bytes:
     floats = np.zeros(12, "<f4")
     floats[3:] = TRIANGLE.ravel()
@@ -75,12 +83,13 @@ def test_order_is_by_what_tells_symmetric_shapes_apart() -> None:
     """All orders of six boxes that mirror each other give the same rows."""
     places = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
     rows = [reach(placed(box_corners((1, 1, 1)), Pose.at(*place))) for place in places]
-    wanted = outlines("a", rows, rows[:2])
-    assert set(wanted) == {"a/boxes", "a/meshes", "a/rounds"}
-    assert {row.tobytes() for row in wanted["a/boxes"]} == {row.tobytes() for row in rows}
+    meshes = [("meshes", row) for row in rows[:2]]
+    wanted = outlines([*(("boxes", row) for row in rows), *meshes])
+    assert set(wanted) == {"boxes", "meshes", "rounds"}
+    assert {row.tobytes() for row in wanted["boxes"]} == {row.tobytes() for row in rows}
     for seed in range(10):
         order = np.random.default_rng(seed).permutation(6)
-        found = outlines("a", [rows[k] for k in order], rows[1::-1])
+        found = outlines([*(("boxes", rows[k]) for k in order), *meshes[::-1]])
         for name, value in wanted.items():
             np.testing.assert_array_equal(found[name], value)
 

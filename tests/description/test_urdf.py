@@ -13,10 +13,10 @@ import pytest
 
 from pytest_simbench.description.robot_files import folder, received, with_content
 from pytest_simbench.description.shapes import reach, shape_points
-from pytest_simbench.description.urdf import write_origin
+from pytest_simbench.description.urdf import body_urdf, write_origin
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.scene import Compound, ConvexMesh, Cylinder, Pose, Scene, principal
 from pytest_simbench.scene.pose import quaternion_of
 from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.worker.wire import pack, unpack
@@ -53,6 +53,29 @@ def test_dynamics_are_those_of_the_original(base: Pose, tmp_path: Path) -> None:
 
 def test_lines_are_short_enough_for_bullet() -> None:
     assert max(map(len, PreparedRobot(panda()).to_urdf().splitlines())) < 1000
+
+
+def test_other_fingers_follow_and_nothing_is_drawn_where_asked() -> None:
+    root = ET.fromstring(PreparedRobot(panda()).to_urdf(mimic=True, visuals=False))
+    followers = {j.get("name"): m.get("joint") for j in root for m in j.iter("mimic")}
+    assert followers == {"panda_finger_joint2": "panda_finger_joint1"}
+    assert next(root.iter("visual"), None) is None
+
+
+def test_a_body_is_one_link(tmp_path: Path) -> None:
+    """With its mass about its own frame, and each shape at its place, also as a picture."""
+    corners, _ = principal([(0, 0, 0), (0.06, 0, 0), (0, 0.06, 0), (0, 0, 0.06)])
+    parts = (Cylinder("rod", 0.01, 0.06, Pose.at(0, 0, 0.1)), ConvexMesh("rock", corners, Pose()))
+    body = Compound("pair", parts, Pose.at(1, 2, 3), 0.5, moments=(0.1, 0.2, 0.25))
+    (link,) = ET.fromstring(body_urdf(body, lambda name, hull: tmp_path / name))
+    assert [link.find("inertial/mass").get("value"), link.find("inertial/inertia").get("izz")] == [
+        "0.5", "0.25",
+    ]  # fmt: skip
+    for kind in ("collision", "visual"):
+        rod, rock = link.findall(kind)
+        assert rod.find("geometry/cylinder").attrib == {"radius": "0.01", "length": "0.06"}
+        assert rod.find("origin").get("xyz") == "0.0 0.0 0.1"
+        assert rock.find("geometry/mesh").get("filename") == str(tmp_path / "1")
 
 
 def test_limits_are_those_of_the_original(tmp_path: Path) -> None:

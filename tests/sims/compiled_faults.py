@@ -61,11 +61,6 @@ def com(c: Compiled) -> None:
     c.model.body_sameframe[c.body(CUBE)] = 0
 
 
-def damping(c: Compiled) -> None:
-    start = c.model.body_dofadr[c.body(CUBE)]
-    c.model.dof_damping[start : start + 6] = 0.1
-
-
 def friction(c: Compiled) -> None:
     c.model.dof_frictionloss[c.model.jnt_dofadr[c.joint]] = 0.5
 
@@ -82,12 +77,9 @@ def finger_shape(c: Compiled) -> None:
 CHANGES: dict[str, Change] = {
     "timestep": lambda c: setattr(c.model.opt, "timestep", 0.005),
     "ground/height": height,
-    "ground/restitution": geom("ground", "geom_solref", BOUNCY),
-    "body/cube/restitution": geom(CUBE, "geom_solref", BOUNCY),
     "body/cube/margin": geom(CUBE, "geom_margin", 0.002),
     "body/cube/touches": geom(CUBE, "geom_conaffinity", 0),
     "body/cube/com": com,
-    "body/cube/damping": damping,
     "body/cube/gravity": body(CUBE, "body_gravcomp", 1.0),
     "link/panda_link4/restitution": geom(LINK, "geom_solref", BOUNCY),
     "link/panda_link4/margin": geom(LINK, "geom_margin", 0.002),

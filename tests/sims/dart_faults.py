@@ -44,14 +44,16 @@ def uncoupled(s: Any) -> None:
     finger.setActuatorType(dartpy.dynamics.ActuatorType.PASSIVE)
 
 
+def one_of_several(s: Any) -> None:
+    shapes = [x for x in part(s, "panda_leftfinger").getShapeNodes() if x.hasDynamicsAspect()]
+    shapes[-1].getDynamicsAspect().setFrictionCoeff(0.3)
+
+
 FAULTS: dict[str, Plant] = {
     "timestep": lambda s: s.world.setTimeStep(0.002),
     "ground/height": height,
-    "ground/restitution": bouncy("ground"),
-    "body/cube/restitution": bouncy("cube"),
     "body/cube/touches": lambda s: s._bodies["cube"].setCollidable(False),
     "body/cube/com": com,
-    "body/cube/damping": lambda s: s._bodies["cube"].getParentJoint().setDampingCoefficient(4, 0.1),
     "body/cube/gravity": lambda s: s._bodies["cube"].setGravityMode(False),
     "body/cube/dynamic": lambda s: s._bodies["cube"].getSkeleton().setMobile(False),
     "link/panda_link4/restitution": bouncy("panda_link4"),
@@ -60,6 +62,7 @@ FAULTS: dict[str, Plant] = {
     "joint/panda_joint4/friction": lambda s: s._robot.getJoint("panda_joint4").setCoulombFriction(
         0, 0.5
     ),
+    "link/panda_leftfinger/friction, one shape": one_of_several,
     "gripper/coupled": uncoupled,
 }
 

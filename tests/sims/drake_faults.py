@@ -31,20 +31,48 @@ def ghost(name: str) -> Plant:
     return plant
 
 
-def margin(name: str) -> Plant:
+def surface(name: str, change: Plant) -> Plant:
+    """The properties of the last shape of a body or link changed."""
+
     def plant(s: Any) -> None:
         from pydrake.geometry import ProximityProperties, RoleAssign
 
         shape = s.world.shapes[name][-1]
         inspector = s.scene_graph.model_inspector()
-        surface = ProximityProperties(inspector.GetProximityProperties(shape))
-        surface.UpdateProperty("hydroelastic", "margin", 0.002)
+        properties = ProximityProperties(inspector.GetProximityProperties(shape))
+        change(properties)
         s.scene_graph.AssignRole(
             context=s.scene_graph.GetMyMutableContextFromRoot(s.root),
             source_id=s.plant.get_source_id(),
             geometry_id=shape,
-            properties=surface,
+            properties=properties,
             assign=RoleAssign.kReplace,
+        )
+
+    return plant
+
+
+def margin(properties: Any) -> None:
+    properties.UpdateProperty("hydroelastic", "margin", 0.002)
+
+
+def slippery(properties: Any) -> None:
+    from pydrake.multibody.plant import CoulombFriction
+
+    properties.UpdateProperty("material", "coulomb_friction", CoulombFriction(0.5, 0.5))
+
+
+def reshaped(name: str, kind: str, *size: float) -> Plant:
+    """Another first shape of a body."""
+
+    def plant(s: Any) -> None:
+        from pydrake import geometry
+
+        s.scene_graph.ChangeShape(
+            context=s.scene_graph.GetMyMutableContextFromRoot(s.root),
+            source_id=s.plant.get_source_id(),
+            geometry_id=s.world.shapes[name][0],
+            shape=getattr(geometry, kind)(*size),
         )
 
     return plant
@@ -56,10 +84,14 @@ def coupling(s: Any) -> None:
 
 FAULTS: dict[str, Plant] = {
     "body/cube/com": com,
-    "body/cube/margin": margin("cube"),
+    "body/cube/margin": surface("cube", margin),
+    "body/cube/boxes, one corner": reshaped("cube", "Sphere", 0.0045),
+    "body/cube/friction, one shape": surface("cube", slippery),
+    "body/table/boxes": reshaped("table", "Box", 0.914, 0.914, 0.3),
+    "link/panda_leftfinger/friction, one shape": surface("panda_leftfinger", slippery),
     "body/cube/touches": ghost("cube"),
     "body/cube/dynamic": lambda s: s.world.bodies["cube"].Lock(s.context),
-    "link/panda_link4/margin": margin("panda_link4"),
+    "link/panda_link4/margin": surface("panda_link4", margin),
     "link/panda_link4/touches": ghost("panda_link4"),
     "gripper/coupled": coupling,
 }

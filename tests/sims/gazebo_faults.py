@@ -22,26 +22,6 @@ LINK = "model[@name='robot']/link[@name='panda_link4']"
 JOINT = "model[@name='robot']/joint[@name='panda_joint4']/axis"
 CUBE = "model[@name='cube_05']"
 BOX = f"{CUBE}/link/collision"
-GROUND = "model[@name='ground']/link/collision"
-
-
-class FaultyGazebo(Planting, Gazebo):
-    def load(self, scene: Scene) -> None:
-        honest = adapter.world_text
-
-        def text(*args: Any) -> str:
-            root = ET.fromstring(honest(*args))
-            world = root.find("world")
-            assert world is not None
-            PLANTS[self.settings.fault](world)
-            return ET.tostring(root, encoding="unicode")
-
-        if self.settings.fault:
-            adapter.world_text = text
-        try:
-            Gazebo.load(self, scene)
-        finally:
-            adapter.world_text = honest
 
 
 Fault = Callable[[ET.Element], None]
@@ -94,8 +74,6 @@ def ghost(path: str) -> Fault:
 FAULTS: dict[str, Fault] = {
     "timestep": scaled("physics/max_step_size", 0.5),
     "ground/height": moved("model[@name='ground']/pose", 2, 0.01),
-    "ground/restitution": bouncing(GROUND),
-    "body/cube_05/restitution": bouncing(BOX),
     "body/cube_05/com": moved(f"{CUBE}/link/inertial/pose", 0, 0.01),
     "body/cube_05/gravity": added(f"{CUBE}/link", "gravity", "false"),
     "body/cube_05/touches": ghost(BOX),
@@ -117,3 +95,24 @@ def childless(world: ET.Element) -> None:
 
 PLANTS: dict[str, Fault] = {**FAULTS, "refused": childless}
 """What can be planted: a fault, or what Gazebo refuses."""
+
+
+class FaultyGazebo(Planting, Gazebo):
+    faults = FAULTS
+
+    def load(self, scene: Scene) -> None:
+        honest = adapter.world_text
+
+        def text(*args: Any) -> str:
+            root = ET.fromstring(honest(*args))
+            world = root.find("world")
+            assert world is not None
+            PLANTS[self.settings.fault](world)
+            return ET.tostring(root, encoding="unicode")
+
+        if self.settings.fault:
+            adapter.world_text = text
+        try:
+            Gazebo.load(self, scene)
+        finally:
+            adapter.world_text = honest

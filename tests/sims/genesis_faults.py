@@ -30,10 +30,6 @@ def one_finger_shape(s: Any) -> None:
     array_of(s.solver.dyn_info.geoms.friction, copy=False)[shape] = 0.3
 
 
-def other_gravity(s: Any) -> None:
-    array_of(s.solver.rigid_info.gravity, copy=False)[..., 2] = -9.7
-
-
 def other_timestep(s: Any) -> None:
     array_of(s.solver.rigid_info.substep_dt, copy=False)[...] = 0.005
 
@@ -43,17 +39,12 @@ def uncoupled(s: Any) -> None:
 
 
 def in_geoms(name: str, array: str, value: Any) -> Plant:
-    """Sets rows of all shapes of a link, a body or the ground."""
+    """Sets rows of all shapes of a link or a body."""
 
     def plant(s: Any) -> None:
-        if name == "ground":
-            shapes = s._ground.geoms
-        elif name in s._boxes:
-            shapes = s._boxes[name].geoms
-        else:
-            shapes = s._robot.get_link(name).geoms
+        owner = s._boxes[name] if name in s._boxes else s._robot.get_link(name)
         tensor = array_of(getattr(s.solver.dyn_info.geoms, array), copy=False)
-        for shape in shapes:
+        for shape in owner.geoms:
             tensor[shape.idx, : len(value)] = value
 
     return plant
@@ -80,11 +71,6 @@ def centre(s: Any) -> None:
     array_of(s.solver.dyn_info.links.inertial_pos, copy=False)[link, 0] = 0.01
 
 
-def damped(s: Any) -> None:
-    link = s._boxes["cube_05"].links[0]
-    array_of(s.solver.dyn_info.dofs.damping, copy=False)[link.dof_start : link.dof_end] = 0.1
-
-
 def weightless(robot: bool) -> Plant:
     def plant(s: Any) -> None:
         link = s._robot.links[0] if robot else s._boxes["cube_05"].links[0]
@@ -99,17 +85,13 @@ BOUNCY = (0.02, 0.1)
 
 FAULTS: dict[str, Plant] = {
     "ground/height": lifted_ground,
-    "ground/restitution": in_geoms("ground", "sol_params", BOUNCY),
-    "body/cube_05/restitution": in_geoms("cube_05", "sol_params", BOUNCY),
     "body/cube_05/touches": no_pairs("cube_05"),
     "body/cube_05/com": centre,
-    "body/cube_05/damping": damped,
     "body/cube_05/gravity": weightless(robot=False),
     "link/panda_link4/restitution": in_geoms("panda_link4", "sol_params", BOUNCY),
     "link/panda_link4/touches": no_pairs("panda_link4"),
     "link/panda_link4/gravity": weightless(robot=True),
     "joint/panda_joint4/friction": rubbing,
-    "gravity": other_gravity,
     "timestep": other_timestep,
     "joint/panda_joint4/effort_limit": effort_limit,
     "link/panda_leftfinger/friction": one_finger_shape,

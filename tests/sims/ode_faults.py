@@ -15,12 +15,7 @@ from typing import Any
 import numpy as np
 from pytest_simbench.sims.ode.adapter import ODE
 from pytest_simbench.sims.ode.contacts import distinct
-from pytest_simbench.sims.ode.library import (
-    Mesh,
-    body_id,
-    library,
-    place,
-)
+from pytest_simbench.sims.ode.library import Mesh, body_id, library, place
 
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import lazy_import
@@ -124,13 +119,9 @@ def uncoupled(s: Any) -> None:
 
 
 FAULTS: dict[str, Plant] = {
-    "gravity": lambda s: s.world.setGravity((0.0, 0.0, -9.7)),
     "timestep": step,
     "ground/height": lambda s: part(s, "ground").geoms[0].setParams((0.0, 0.0, 1.0), 0.01),
-    "ground/restitution": surface("ground", "bounce", 0.5),
-    "body/cube_05/restitution": surface("cube_05", "bounce", 0.5),
     "body/cube_05/com": aside,
-    "body/cube_05/damping": damped("cube_05"),
     "body/cube_05/gravity": weightless("cube_05"),
     "body/cube_05/touches": ghost("cube_05"),
     "body/cube_05/dynamic": lambda s: part(s, "cube_05").body.setKinematic(),

@@ -9,69 +9,61 @@ from __future__ import annotations
 import re
 from typing import Any
 
-import pytest_simbench.sims.ovphysx.adapter as adapter
+from pytest_simbench.sims.ovphysx.adapter import OvPhysX
 
-from pytest_simbench.scene import Scene
+from .planted import Plant, Planting
 
-from .planted import Planting
 
-FAULTS: dict[str, tuple[str, str, str]] = {
-    "ground/height": (
+def stage(prim: str, attribute: str, value: str) -> Plant:
+    """Another value of one attribute in the stage, from which the world begins anew."""
+    pattern = rf'(def \w+ "{prim}".*?\n[\w\[\] ]+ {attribute} = )[^\n]+'
+
+    def plant(s: Any) -> None:
+        wrong, count = re.subn(pattern, lambda m: m[1] + value, s._text, count=1, flags=re.S)
+        if count != 1 or wrong == s._text:
+            raise ValueError(f"the stage has no {attribute} at {prim} to be changed")
+        s._text = wrong
+        s._start()
+
+    return plant
+
+
+FAULTS: dict[str, Plant] = {
+    "ground/height": stage(
         "ground",
         "axis",
         '"Z"\ndouble3 xformOp:translate = (0, 0, 0.01)\n'
         'uniform token[] xformOpOrder = ["xformOp:translate"]',
     ),
-    "body/brick/pose": ("body_1", "xformOp:translate", "(0.5, 0.1, 0.316)"),
-    "joint/panda_joint4/initial_position": ("joint_3", "state:angular:physics:position", "-90"),
-    "body/brick/com": ("body_1", "physics:centerOfMass", "(0.01, 0, 0)"),
-    "body/brick/gravity": (
+    "body/brick/com": stage("body_1", "physics:centerOfMass", "(0.01, 0, 0)"),
+    "body/brick/gravity": stage(
         "body_1",
         "physics:mass",
         "0.23\nbool physxRigidBody:disableGravity = true",
     ),
-    "body/brick/margin": (
+    "body/brick/margin": stage(
         "body_1",
         "material:binding:physics",
         "</World/friction_0p7>\nfloat physxCollision:restOffset = 0.002",
     ),
-    "body/brick/restitution": ("friction_0p7", "physics:restitution", "0.5"),
-    "link/panda_link4/restitution": ("friction_1p0", "physics:restitution", "0.5"),
-    "link/panda_link4/margin": (
+    "link/panda_link4/restitution": stage("friction_1p0", "physics:restitution", "0.5"),
+    "link/panda_link4/margin": stage(
         "link_4",
         "material:binding:physics",
         "</World/friction_1p0>\nfloat physxCollision:restOffset = 0.002",
     ),
-    "link/panda_link4/gravity": (
+    "link/panda_link4/gravity": stage(
         "link_4",
         "physics:mass",
         "3.587895\nbool physxRigidBody:disableGravity = true",
     ),
-    "joint/panda_joint4/friction": (
+    "joint/panda_joint4/friction": stage(
         "joint_3",
         "physxJointAxis:angular:armature",
         "0.1\nfloat physxJointAxis:angular:staticFrictionEffort = 0.5",
     ),
 }
-"""Prim, attribute and wrong value, by the quantity that must be found wrong."""
 
 
-class FaultyOvPhysX(Planting, adapter.OvPhysX):
-    """Hands PhysX a stage in which one attribute has another value."""
-
-    def load(self, scene: Scene) -> None:
-        honest = adapter.Session
-        prim, attribute, value = FAULTS[self.settings.fault]
-        pattern = rf'(def \w+ "{prim}".*?\n[\w\[\] ]+ {attribute} = )[^\n]+'
-
-        def edited(text: str, threads: int) -> Any:
-            wrong, count = re.subn(pattern, lambda m: m[1] + value, text, count=1, flags=re.S)
-            if count != 1 or wrong == text:
-                raise ValueError(f"the stage has no {attribute} at {prim} to be changed")
-            return honest(wrong, threads)
-
-        adapter.Session = edited
-        try:
-            adapter.OvPhysX.load(self, scene)
-        finally:
-            adapter.Session = honest
+class FaultyOvPhysX(Planting, OvPhysX):
+    faults = FAULTS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pytest_simbench.scene import FloatArray
-from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, view_axes
 
 WIDTH, HEIGHT = 320, 240
 RED = (0.9, 0.05, 0.05, 1.0)
@@ -13,13 +13,10 @@ RED = (0.9, 0.05, 0.05, 1.0)
 
 def pixel(point: FloatArray) -> tuple[int, int]:
     """Row and column of a point in the picture of a pinhole camera at `EYE`, upright."""
-    forward = np.subtract(LOOK_AT, EYE) / np.linalg.norm(np.subtract(LOOK_AT, EYE))
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    down = np.cross(forward, right)
+    right, down, ahead = view_axes().T
     offset = point - np.array(EYE)
     focal = HEIGHT / 2 / np.tan(FIELD_OF_VIEW / 2)
-    x, y = focal * np.array([offset @ right, offset @ down]) / (offset @ forward)
+    x, y = focal * np.array([offset @ right, offset @ down]) / (offset @ ahead)
     return int(HEIGHT / 2 + y), int(WIDTH / 2 + x)
 
 

@@ -68,8 +68,6 @@ FAULTS: dict[str, Plant] = {
     "ground/height": call(
         "resetBasePositionAndOrientation", lambda s: s._ground, [0, 0, 0.01], [0, 0, 0, 1]
     ),
-    "ground/restitution": bullet("ground", restitution=0.5),
-    "body/cube/restitution": bullet("cube", restitution=0.5),
     "body/cube/margin": bullet("cube", collisionMargin=0.005),
     "body/cube/com": com,
     "body/cube/dynamic": call("createConstraint", lambda s: s._bodies["cube"], *HELD),

@@ -22,12 +22,13 @@ def shape(name: str, setter: str, *values: Any) -> Plant:
     return plant
 
 
-def bouncy(name: str) -> Plant:
+def stuff(name: str, friction: float, restitution: float) -> Plant:
+    """Of the last shape."""
+
     def plant(s: Any) -> None:
         import sapien
 
-        friction = true_scene().ground_friction
-        material = sapien.physx.PhysxMaterial(friction, friction, 0.5)
+        material = sapien.physx.PhysxMaterial(friction, friction, restitution)
         shape(name, "set_physical_material", material)(s)
 
     return plant
@@ -46,15 +47,13 @@ def com(s: Any) -> None:
 FAULTS: dict[str, Plant] = {
     "timestep": lambda s: setattr(s._system, "timestep", 0.005),
     "ground/height": lambda s: s._ground.entity.set_pose(raised(s._ground.entity.pose)),
-    "ground/restitution": bouncy("ground"),
-    "body/cube/restitution": bouncy("cube"),
     "body/cube/margin": shape("cube", "set_rest_offset", 0.002),
     "body/cube/touches": shape("cube", "set_collision_groups", [0, 0, 0, 0]),
     "body/cube/com": com,
-    "body/cube/damping": body("cube", "linear_damping", 0.1),
     "body/cube/gravity": body("cube", "disable_gravity", True),
     "body/cube/dynamic": body("cube", "kinematic", True),
-    "link/panda_link4/restitution": bouncy("panda_link4"),
+    "link/panda_link4/restitution": stuff("panda_link4", true_scene().ground_friction, 0.5),
+    "link/panda_leftfinger/friction, one shape": stuff("panda_leftfinger", 0.5, 0.0),
     "link/panda_link4/margin": shape("panda_link4", "set_rest_offset", 0.002),
     "link/panda_link4/touches": shape("panda_link4", "set_collision_groups", [0, 0, 0, 0]),
     "link/panda_link4/damping": body("panda_link4", "angular_damping", 0.1),

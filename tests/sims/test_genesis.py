@@ -9,7 +9,6 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from scipy.spatial import ConvexHull
 
 from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.description.stl import written_stl
-from pytest_simbench.scene import Gripper, Joint, Robot, Scene, Trajectory
+from pytest_simbench.scene import Gripper, Joint, Robot, Scene
 from pytest_simbench.testing import scenes
 
 from .worlds import Worlds
@@ -45,36 +44,6 @@ EGG = """<robot name="egg">
 def worlds() -> Iterator[Worlds]:
     with Worlds(Genesis) as worlds:
         yield worlds
-
-
-def test_the_limit_bounds_drive_and_feed_forward_together(worlds: Worlds) -> None:
-    """An effort of 3000 N m asked for as feed-forward moves joint 1 just as a far position does:
-    both are cut to 87 N m (for so short a time that the damping does not leave the limit)."""
-    robot, timestep = scenes.arm(), Genesis.profiles["tuned"].timestep
-    start, effort = robot.column("initial_position"), np.zeros(9)
-    far = start.copy()
-    far[0] += 2.0
-    effort[0] = 3000.0
-    speeds = []
-    hold = partial(Trajectory.holding, timestep)
-    for command in (hold(far), hold(start, effort)):
-        world = worlds.load(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "weightless"))
-        world.follow(command)
-        world.wait(0.02)
-        speeds.append(world.joints[1, 0])
-    assert speeds[0] > 0.3
-    assert speeds[1] == pytest.approx(speeds[0], rel=0.01)
-
-
-def test_a_world_does_not_remember_the_one_before(worlds: Worlds) -> None:
-    """Kernels stay in the process between worlds; nothing else does."""
-    ends = []
-    for _ in range(2):
-        world = worlds.load(scenes.grip())
-        world.wait(0.1)
-        ends.append((world.bodies.tobytes(), world.joints.tobytes()))
-        worlds.load(scenes.tower()).wait(0.1)
-    assert ends[0] == ends[1]
 
 
 def test_the_worker_survives_a_bad_option(worlds: Worlds) -> None:

@@ -49,21 +49,6 @@ def test_the_worker_runs_in_the_systems_python(worlds: Worlds) -> None:
     assert worlds.worker.python_version == ".".join(version.decode().split())
 
 
-def test_what_is_not_here_is_told(
-    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pytester.makeconftest(
-        """
-from pathlib import Path
-from pytest_simbench.client.system import SystemPython
-SystemPython.python = Path("/no/such/python3")
-"""
-    )
-    result = pytester.runpytest_subprocess("--sim=ode")
-    assert result.ret == 4
-    result.stderr.fnmatch_lines(["*ode needs the system's Python, and /no/such/python3 does not *"])
-
-
 def test_a_record_has_the_versions_of_both_libraries(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         """

@@ -6,81 +6,16 @@ are skipped with the command that makes it.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
 from pytest_simbench.sims.ovphysx.adapter import OvPhysX
 
 from pytest_simbench.client.environments import missing
-from pytest_simbench.client.errors import WorkerError
-from pytest_simbench.scene import Box, Pose, Scene, Trajectory
-from pytest_simbench.tasks import Jitter, Stacking, Throwing
-from pytest_simbench.testing import ConformanceFailure, Subject, scenes
-
-from .coverage import uncovered
-from .ovphysx_faults import FAULTS, FaultyOvPhysX
+from pytest_simbench.scene import Trajectory
+from pytest_simbench.testing import Subject, scenes
 
 ABSENT = missing(OvPhysX.info)
 pytestmark = pytest.mark.skipif(ABSENT is not None, reason=str(ABSENT))
-
-SCENE = Scene(
-    "parity",
-    (
-        Box("table", (0.9, 0.9, 0.3), Pose.at(0.8, 0.0, 0.15), friction=0.7),
-        Box("brick", (0.1, 0.06, 0.03), Pose.at(0.5, 0.1, 0.315, yaw=0.4), 0.23, 0.7),
-    ),
-    robot=scenes.arm(),
-    ground_friction=0.7,
-    friction_rule="mean",  # the engine's own, so that its stage has these numbers
-)
-
-
-@pytest.mark.parametrize("profile", ["default", "tuned"])
-@pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda task: task.name)
-def test_an_honest_world_passes(task: Any, profile: str) -> None:
-    with Subject(OvPhysX, profile).world(task.scene(7, Jitter())) as world:
-        assert world.time == 0
-
-
-AT_THE_START = ("body/brick/pose", "joint/panda_joint4/initial_position")
-"""Seen in the state that the engine starts with, before anything is read back."""
-
-
-@pytest.mark.parametrize("quantity", FAULTS)
-def test_fault_is_caught(quantity: str) -> None:
-    error: type[Exception] = WorkerError
-    wrong = rf"{quantity}: scene .*, ovphysx "
-    if quantity in AT_THE_START:
-        error, wrong = ConformanceFailure, r"starts at \(.*\), where the scene has"
-    with (
-        pytest.raises(error, match=wrong),
-        Subject(FaultyOvPhysX).world(SCENE, fresh=True, changes={"fault": quantity}),
-    ):
-        pass
-
-
-def test_nothing_is_left_out() -> None:
-    with Subject(OvPhysX).world(SCENE) as world:
-        assert uncovered(world.process.request("read_back"), FAULTS) == set()
-
-
-def test_the_limit_bounds_drive_and_feed_forward_together() -> None:
-    """An effort of 3000 N m asked for as feed-forward moves joint 1 just as a far position does:
-    both are cut to 87 N m (in so short a time that the damping does not leave the limit)."""
-    subject, robot = Subject(OvPhysX), scenes.arm()
-    start, effort = robot.column("initial_position"), np.zeros(9)
-    far = start.copy()
-    far[0] += 2.0
-    effort[0] = 3000.0
-    speeds = []
-    for command in (Trajectory.holding(0.004, far), Trajectory.holding(0.004, start, effort)):
-        with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "weightless")) as world:
-            world.follow(command)
-            world.wait(0.02)
-            speeds.append(world.joints[1, 0])
-    assert speeds[0] > 0.5
-    assert speeds[1] == pytest.approx(speeds[0], rel=0.01)
 
 
 def test_the_first_command_is_obeyed_like_any_other() -> None:

@@ -1,6 +1,6 @@
 """What only SAPIEN's adapter has to show: its settings reach PhysX, `default` is what PhysX and
-SAPIEN do by themselves, feed-forward counts towards the effort limit, the tendon between the
-fingers takes nothing of the squeeze, and what a restored world keeps."""
+SAPIEN do by themselves, the tendon between the fingers takes nothing of the squeeze, and what a
+restored world keeps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -17,11 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pytest_simbench.sims.sapien.adapter import SAPIEN
 
-from pytest_simbench.ground.errors import DescriptionError
-from pytest_simbench.parity.compare import check
-from pytest_simbench.parity.quantities import expected_quantities
-from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
-from pytest_simbench.simulator import ParityError, PreparedRobot
+from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import scenes
 
@@ -57,57 +53,12 @@ def test_default_is_what_the_engine_does_by_itself(tmp_path: Path) -> None:
     builder.initial_pose = sapien.Pose([0.6, 0.3, 0.025])
     cube = builder.build("cube").find_component_by_type(physx.PhysxRigidDynamicComponent)
     simulator._ground, simulator._free = cube, [cube]
-    path = PreparedRobot(scenes.arm()).write_urdf(tmp_path)
-    without_visuals(path)
+    path = PreparedRobot(scenes.arm()).write_urdf(tmp_path, visuals=False)
     simulator._robot = (
         bare.create_urdf_loader().load_file_as_articulation_builder(str(path)).build(True)
     )
     expected = {k: v for k, v in vars(simulator.settings).items() if k != "coupling_stiffness"}
     assert told_sapien(simulator) == pytest.approx(expected)
-
-
-def without_visuals(path: Path) -> None:
-    tree = ElementTree.parse(path)
-    for link in tree.iter("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
-    tree.write(path)
-
-
-def turned_by_joint_1(robot: Robot, effort: float, seconds: float) -> tuple[float, float]:
-    """Angular momentum about joint 1 [N m s] after an effort feed-forward, and the time [s]."""
-    import pinocchio as pin
-
-    from pytest_simbench.motion.model import RobotModel
-
-    start = robot.column("initial_position")
-    push = np.zeros_like(start)
-    push[0] = effort
-    with world(scenes.arm_alone(robot, (0.0, 0.0, 0.0))) as simulator:
-        simulator.command(start, 0 * start, push)
-        while simulator.time < seconds - 1e-9:
-            simulator.step()
-        time, (q, v) = simulator.time, simulator.joint_state()
-    model = RobotModel(robot)
-    data = model.pin.createData()
-    upper = np.triu(pin.crba(model.pin, data, q))
-    return float(((upper + np.triu(upper, 1).T) @ v)[0]), time
-
-
-def soft_joint_1() -> Robot:
-    """The arm, joint 1 without damping and nearly without stiffness: its effort is the feed-forward
-    alone. A limit of 20 N m."""
-    return scenes.with_joint(
-        scenes.arm(), "panda_joint1", stiffness=1.0, damping=0.0, effort_limit=20.0
-    )
-
-
-@pytest.mark.parametrize(("effort", "applied"), [(10.0, 10.0), (-10.0, -10.0), (60.0, 20.0)])
-def test_feed_forward_is_an_effort_and_counts_towards_the_limit(
-    effort: float, applied: float
-) -> None:
-    momentum, time = turned_by_joint_1(soft_joint_1(), effort, 0.1)
-    assert momentum == pytest.approx(applied * time, rel=0.05)
 
 
 def forces_on(simulator: SAPIEN, body: Any) -> dict[str, FloatArray]:
@@ -204,53 +155,6 @@ def test_what_was_before_a_restore_leaves_no_trace(
             futures.append((future(simulator, 100), simulator.joint_state()))
     assert np.array_equal(futures[0][0], futures[1][0])
     assert np.array_equal(futures[0][1], futures[1][1])
-
-
-def test_a_mesh_that_is_none_is_an_error(tmp_path: Path) -> None:
-    robot = scenes.arm()
-    tree = ElementTree.parse(robot.urdf)
-    broken = tmp_path / "broken.stl"
-    broken.write_bytes(b"")
-    mesh = next(mesh for mesh in tree.iter("mesh") if mesh.get("filename", "").endswith(".stl"))
-    mesh.set("filename", broken.name)
-    description = tmp_path / "robot.urdf"
-    tree.write(description)
-    scene = scenes.arm_alone(replace(robot, urdf=str(description)))
-    with pytest.raises(DescriptionError, match="mesh that cannot be used"), world(scene):
-        pass
-
-
-SCENE = Stacking().scene(1, Jitter())
-
-
-def compare(simulator: SAPIEN) -> None:
-    expected = expected_quantities(SCENE, simulator.settings)
-    check(expected, simulator.read_back(), simulator.info.deviations, simulator.info.name)
-
-
-def test_one_shape_of_several_is_seen() -> None:
-    """What the kit's worlds and `sapien_faults` do not plant: a finger of two frictions."""
-    from sapien import physx
-
-    with world(SCENE) as simulator:
-        compare(simulator)
-        shapes = simulator._links["panda_leftfinger"].collision_shapes
-        shapes[-1].physical_material = physx.PhysxMaterial(0.5, 0.5, 0.0)
-        with pytest.raises(ParityError, match="link/panda_leftfinger/friction: scene .*, sapien "):
-            compare(simulator)
-
-
-@pytest.mark.parametrize(
-    ("quantity", "built"),
-    [
-        ("gravity", replace(SCENE, gravity=(0.0, 0.0, -9.7))),
-        ("body/table/boxes", replace(SCENE, bodies=(Box("table", (0.9, 0.9, 0.2), Pose()),))),
-    ],
-)
-def test_another_scene_is_caught(quantity: str, built: Scene) -> None:
-    """What SAPIEN cannot change once it is built."""
-    with world(built) as simulator, pytest.raises(ParityError, match=f"{quantity}: scene .*"):
-        compare(simulator)
 
 
 def test_bodies_are_read_in_one_call_as_each_tells_itself() -> None:

@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import re
-import struct
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pytest_simbench.sims.ovphysx.usd_text import (
-    attributes,
-    mass_lines,
-    prim,
-    read_stl,
-    turn_from_x,
-)
+from pytest_simbench.sims.ovphysx.usd_text import attributes, mass_lines, prim, turn_from_x
 
 from pytest_simbench.scene import FloatArray, rotation_matrix
 
@@ -54,21 +46,6 @@ def test_mass_lines_keep_the_inertia(
     np.testing.assert_allclose(axes @ np.diag(principal) @ axes.T, inertia, atol=1e-9)
     assert written(lines, "physics:mass") == 2.5
     np.testing.assert_array_equal(written(lines, "physics:centerOfMass"), [0.1, -0.2, 0.3])
-
-
-def test_read_stl_gives_the_triangles(tmp_path: Path) -> None:
-    corners = np.arange(18, dtype="<f4").reshape(2, 3, 3) / 8
-    body = b"".join(bytes(12) + triangle.tobytes() + bytes(2) for triangle in corners)
-    path = tmp_path / "mesh.stl"
-    path.write_bytes(bytes(80) + struct.pack("<I", 2) + body)
-    np.testing.assert_array_equal(read_stl(path), corners)
-
-
-def test_read_stl_refuses_text(tmp_path: Path) -> None:
-    path = tmp_path / "mesh.stl"
-    path.write_text("solid mesh\n" * 20)
-    with pytest.raises(ValueError, match=r"mesh\.stl is no binary STL"):
-        read_stl(path)
 
 
 def test_attributes_are_typed_and_none_is_left_out() -> None:
