@@ -32,7 +32,7 @@ from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import NAME
-from pytest_simbench.report.files import write_outcome, write_report
+from pytest_simbench.report.files import write_badge, write_outcome, write_report
 from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.markdown.github import append_summary
 from pytest_simbench.report.model.outcome import Outcome
@@ -292,7 +292,8 @@ class Run:
         baseline, report = found or ("", None)
         outcome = Outcome(passed, baseline, report, looks)
         problems.append(write_outcome(path, outcome))
-        problems.append(runs.badge(options.value(self.config, "sim_badge"), records, passed))
+        if badge := options.value(self.config, "sim_badge"):
+            problems.append(write_badge(Path(badge), records, passed))
         problems += recorded
         if written.complete and not unsaved:
             self.page = path / PAGE_NAME
