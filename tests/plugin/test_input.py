@@ -63,7 +63,7 @@ def test_bad_option(pytester: pytest.Pytester, arguments: list[str], message: st
     def begin() -> None:
         session = session_of(pytester.parseconfig(*arguments))
         session.check_options()
-        session.start()
+        session.pytest_sessionstart()
 
     with pytest.raises(pytest.UsageError) as raised:
         begin()
