@@ -12,10 +12,9 @@ import shutil
 import stat
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 
-from pytest_simbench.cli.values import BadInput
+from pytest_simbench.cli.values import BadInput, refusing
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.settling import TASK as SETTLING
@@ -52,15 +51,6 @@ RUNS = ".simbench"
 """Where runs lie for which no folder is given."""
 
 
-@contextmanager
-def _refused(error: type[Exception], where: str = "") -> Iterator[None]:
-    """Make bad input of such errors in this block, after `WHERE: `."""
-    try:
-        yield
-    except error as reason:
-        raise BadInput(f"{where}: {reason}" if where else str(reason)) from None
-
-
 Folders = dict[str, RunFolder]
 """Of runs, by the names that a user gave."""
 
@@ -80,7 +70,7 @@ def _read(names: Sequence[str]) -> tuple[Folders, dict[str, Reading]]:
         if file in files:
             raise BadInput(f"{name}: the run is given twice")
         folders[name] = RunFolder.of(path)
-        with _refused(RecordError, name):
+        with refusing(RecordError, name):
             readings[name] = folders[name].read()
         files.add(file)
     return folders, readings
@@ -104,7 +94,7 @@ def _merged(readings: dict[str, Reading]) -> tuple[list[Merged], Reading]:
     Raises:
         BadInput: they are not parts of one run, or hold nothing.
     """
-    with _refused(MergeError):
+    with refusing(MergeError):
         records = merge({name: found.records for name, found in readings.items()})
         tasks = merge_tasks({name: found.tasks for name, found in readings.items()})
     if not records:

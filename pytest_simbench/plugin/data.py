@@ -7,8 +7,10 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.cli.values import refusing
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import options
+from pytest_simbench.plugin.arguments import failing
 
 
 def folder(config: pytest.Config) -> Path:
@@ -39,11 +41,5 @@ def read_or_skip(config: pytest.Config, name: str) -> Any:
     """A data set; without it the test is skipped, with a broken one or a wrong name it fails."""
     from pytest_simbench.data import DataError, DataMissing, read
 
-    problem, missing = "", False  # told outside of `except`, else pytest shows both exceptions
-    try:
+    with failing(DataError), refusing(DataMissing, kind=pytest.skip.Exception):
         return read(name, folder(config))
-    except DataError as error:
-        problem, missing = str(error), isinstance(error, DataMissing)
-    if missing:
-        pytest.skip(problem)
-    pytest.fail(problem, pytrace=False)

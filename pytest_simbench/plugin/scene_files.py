@@ -39,10 +39,8 @@ def check(config: pytest.Config) -> None:
     from pytest_simbench.experiment.scene_file import read_scene_file
     from pytest_simbench.simulator import SimulatorError
 
-    try:
+    with options.refusing(SimulatorError, "--sim-scene"):
         read_scene_file(options.value(config, "sim_scene"))
-    except SimulatorError as error:
-        raise pytest.UsageError(f"--sim-scene: {error}") from None
 
 
 def load(
