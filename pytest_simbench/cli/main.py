@@ -77,7 +77,7 @@ COMMANDS = (
             (Argument("names", read.word, "NAME", "as simbench environments lists it", "+"),)),
     Subcommand("environments", "cli.environments:list_environments", "list the environments that "
             "are there, with their sizes"),
-    Subcommand("download", "cli.data_sets:download", "bring a measured data set from its public "
+    Subcommand("download", "cli.environments:download", "bring a measured data set from its public "
             "source", "", (
                 Argument("names", read.word, "NAME", "of a data set", "+"),
                 Argument("--data", read.file, "DIR", "folder to bring it to (default: "

@@ -51,7 +51,7 @@ class Run:
         mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
         page: to look at, once the whole report is written.
-        expected: what later tests will ask for, see `prefetch`; set before the first one asks.
+        expected: what later tests will ask for; set before the first one asks.
     """
 
     def __init__(self, config: pytest.Config) -> None:
