@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import arguments, benchmark, data, options
+from pytest_simbench.plugin import arguments, benchmark, inputs, options
 from pytest_simbench.plugin.cases import case_of, expected, on_this_machine
 from pytest_simbench.plugin.registration import is_conftest
 from pytest_simbench.plugin.session import REPEATED, session_of
@@ -196,7 +196,7 @@ def data_set(request: pytest.FixtureRequest) -> Callable[[str], Any]:
 
     The test is skipped where the set is not on this machine, with the command that brings it.
     """
-    return lambda name: data.read_or_skip(request.config, name)
+    return lambda name: inputs.read_or_skip(request.config, name)
 
 
 @pytest.fixture
@@ -206,10 +206,10 @@ def scene_file(request: pytest.FixtureRequest, output_path: Path) -> Callable[..
     Paths are relative to the test's file; without any it is the file of `--sim-scene`. What of the
     file was carried, and what not, is written into the run folder.
     """
-    from pytest_simbench.plugin.scene_files import load
-
     tell = session_of(request.config).run.tell
-    return lambda path=None, starts=None: load(request, output_path, tell, path, starts)
+    return lambda path=None, starts=None: inputs.load_scene(
+        request, output_path, tell, path, starts
+    )
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.plugin import old_options, options, registration, sanitise, scene_files
+from pytest_simbench.plugin import inputs, old_options, options, registration, sanitise
 from pytest_simbench.plugin.session import REPEATED, fixtures_of, session_of
 
 MARKS = (
@@ -59,7 +59,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(fixtures.free_fixtures(config.pluginmanager), "simbench-fixtures")
     if not (config.getoption("help") or config.getoption("version")):
         session.check_options()
-        scene_files.run_suite(config)
+        inputs.run_suite(config)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import cluster, data, options, recording, scene_files
+from pytest_simbench.plugin import cluster, inputs, options, recording
 
 if TYPE_CHECKING:
     from pytest_simbench.plugin.compare import Comparison
@@ -94,15 +94,13 @@ class SimSession:
     def pytest_sessionstart(self) -> None:
         """Complain of a bad baseline, limit, threshold or folder before anything runs."""
         config = self.config
-        data.check(config)
-        if not self.in_worker:
-            scene_files.check(config)
         if options.given(config, "sim_threshold"):
             from pytest_simbench.plugin.thresholds import bad_value, typed
 
             if wrong := bad_value(typed(config)):
                 raise pytest.UsageError(wrong)
         if not self.in_worker:
+            inputs.check(config)
             recording.check(config)
         named = any(options.given(config, name) for name in ("sim_output", "sim_resume"))
         if named and self._alone:
