@@ -207,9 +207,7 @@ def scene_file(request: pytest.FixtureRequest, output_path: Path) -> Callable[..
     file was carried, and what not, is written into the run folder.
     """
     tell = session_of(request.config).run.tell
-    return lambda path=None, starts=None: inputs.load_scene(
-        request, output_path, tell, path, starts
-    )
+    return partial(inputs.load_scene, request, output_path, tell)
 
 
 @pytest.fixture(scope="session")

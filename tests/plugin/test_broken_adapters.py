@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
 import pytest
 
 from tests.cli.command import simbench
-from tests.plugin.inner import FALLING
+from tests.plugin.inner import FALLING, distribution, importable
 
 GOOD = """
 from dataclasses import replace
@@ -36,18 +35,8 @@ def site(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
     (folder / "good_adapter.py").write_text(GOOD)
     (folder / "raises.py").write_text("raise ValueError('no\\nluck')")
     (folder / "exits.py").write_text("import sys; sys.exit(3)")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), os.environ["PYTHONPATH"]]))
+    importable(monkeypatch, folder)
     pytester.makepyfile(FALLING)
-    return folder
-
-
-def distribution(site: Path, name: str, entries: str | bytes, metadata: bool = True) -> Path:
-    folder = site / f"{name}-1.0.dist-info"
-    folder.mkdir()
-    if metadata:
-        (folder / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-    text = entries if isinstance(entries, bytes) else entries.encode()
-    (folder / "entry_points.txt").write_bytes(b"[pytest_simbench.simulators]\n" + text + b"\n")
     return folder
 
 
@@ -130,7 +119,7 @@ def test_the_same_adapter_twice_is_no_clash(pytester: pytest.Pytester, site: Pat
 
 @pytest.mark.parametrize(("entries", "metadata"), [("= x:Y", True), ("x = y", False)])
 def test_odd_metadata(pytester: pytest.Pytester, site: Path, entries: str, metadata: bool) -> None:
-    distribution(site, "malformed", entries, metadata)
+    distribution(site, "malformed", entries, metadata=metadata)
     result = simbench(pytester, "list", "-v")
     assert result.ret == 0
     result.stdout.fnmatch_lines(["*BROKEN: *malformed*"])

@@ -76,11 +76,3 @@ def test_the_ini_file_may_allow_crashes_and_a_mark_is_nearer(pytester: pytest.Py
     )
     result.assert_outcomes(passed=1, failed=1, deselected=2)
     result.stdout.fnmatch_lines(["FAILED *::test_marked*"])
-
-
-@pytest.mark.parametrize("given", ["1.5", "-0.1", "many"])
-def test_no_share_is_refused(pytester: pytest.Pytester, given: str) -> None:
-    pytester.makepyfile(TEST.format(last=0, marked=0.5))
-    result = pytester.runpytest_subprocess("--sim=mujoco", f"--sim-crashes={given}")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"*--sim-crashes={given}: give a number from 0 to 1"])

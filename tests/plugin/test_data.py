@@ -49,10 +49,3 @@ def test_what_is_not_there_or_broken_is_one_sentence(
     result.assert_outcomes(**{outcome: 1})
     result.stdout.fnmatch_lines([sentence])
     assert "Traceback" not in result.stdout.str()
-
-
-def test_a_folder_that_is_not_there_hides_no_test(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST.format(name="cube_tosses"))
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-data=hree")
-    assert result.ret == 4
-    result.stderr.fnmatch_lines(["*--sim-data: hree is no folder; name the one that holds*"])

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.plugin.run import Run
 from tests.plugin.inner import records
 
 TEST = """
@@ -71,17 +70,6 @@ def test_two_processes_on_one_folder(pytester: pytest.Pytester, arguments: list[
     assert [r["repetition"] for r in records(pytester.path / "o")] == [1, 2]
     (refused,) = [err for (_, err), p in zip(told, both, strict=True) if p.returncode == 4]
     assert b"another run is under way in" in refused or b"already holds a run" in refused
-
-
-def test_bad_folders_are_one_sentence_before_anything_runs(pytester: pytest.Pytester) -> None:
-    pytester.path.joinpath("file").touch()
-    pytester.path.joinpath("link").symlink_to("nowhere/at/all")
-    for output, message in (("file", "file is a file"), ("file/x", "file is a file"),
-                            ("link", "link is a link to nothing"), ("/proc/x", ""),
-                            ("x" * 300, "longer than any file")):  # fmt: skip
-        with pytest.raises(pytest.UsageError, match=message) as raised:
-            Run(pytester.parseconfig(f"--sim-output={output}")).lock()
-        assert "\n" not in str(raised.value)
 
 
 SETTINGS = """

@@ -4,12 +4,11 @@ stopped by the gate."""
 from __future__ import annotations
 
 import json
-import os
 
 import pytest
 
 from tests.cli.command import simbench
-from tests.plugin.inner import records
+from tests.plugin.inner import importable, records
 from tests.plugin.planted import plant
 
 
@@ -20,8 +19,7 @@ def planted(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(environments))
     monkeypatch.setenv("PIP_INDEX_URL", index.as_uri())
     monkeypatch.setenv("PIP_EXTRA_INDEX_URL", (pytester.path / "none").as_uri())
-    path = [str(pytester.path / "site"), *filter(None, [os.environ.get("PYTHONPATH")])]
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
+    importable(monkeypatch, pytester.path / "site")
 
 
 @pytest.mark.usefixtures("planted")

@@ -76,28 +76,6 @@ def test_a_premise_of_stored_starts_that_are_all_alike(
     assert [end[2] for end in ends] == pytest.approx([0.25] * 5, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "message"),
-    [
-        ("none.xml", None, "No such file"),
-        ("scene.sdf", "<sdf/>", "not read yet"),
-        ("scene.txt", "x", "no engine here reads .txt files"),
-        ("scene.xml", "<mujoco><worldbody></mujoco>", "line 1"),
-        ("scene.xml", '<!DOCTYPE a [<!ENTITY b "c">]><mujoco/>', "document type"),
-    ],
-)
-def test_a_bad_file_is_one_sentence_before_anything_runs(
-    pytester: pytest.Pytester, name: str, text: str | None, message: str
-) -> None:
-    if text is not None:
-        (pytester.path / name).write_text(text)
-    found = pytester.runpytest("--sim-scene", name, "--sim", "mujoco")
-    assert found.ret == pytest.ExitCode.USAGE_ERROR
-    (line,) = [line for line in found.stderr.lines if line.startswith("ERROR:")]
-    assert name in line
-    assert message in line
-
-
 @pytest.mark.engine
 def test_a_scene_of_joints_is_refused_by_name(pytester: pytest.Pytester, blocks: Path) -> None:
     blocks.write_text(SCENE.replace("<freejoint/>", '<joint name="hinge" type="hinge"/>', 1))
