@@ -4,51 +4,37 @@ from __future__ import annotations
 
 import pytest
 
+from tests.plugin.inner import no_traceback
+
 TEST = """
     from tests.tiny import Falling
 
     def test_falling(repeat, threshold):
-        repeat(Falling()).assert_at_least("landed", threshold("landed", 0.9))
+        repeat(Falling({duration})).assert_at_least("landed", threshold("landed", 0.9))
 """
 TOO_FEW = "*not judged whether at least 90 %, a claim needs 5 repetitions or more*"
+UNDECIDED = "UNDECIDED test_falling: landed >= 90 %: mujoco *"
 
 
 @pytest.mark.parametrize(
-    ("arguments", "outcome", "message"),
+    ("duration", "arguments", "outcome", "message"),
     [
-        (["--reps=1"], "passed", "UNDECIDED test_falling: landed >= 90 %: mujoco *(a claim needs*"),
-        (["--reps=1", "--sim-strict"], "failed", TOO_FEW),
-        (
-            ["--reps=5"],
-            "passed",
-            "UNDECIDED test_falling: landed >= 90 %: mujoco 100 * (about * more",
-        ),
-        (["--reps=5", "--sim-strict"], "failed", "*inconclusive whether at least 90 %*"),
-        (["--reps=5", "--sim-strict", "--sim-threshold=landed=0.3"], "passed", ""),
+        (0.6, ["--reps=1"], "passed", f"{UNDECIDED}(a claim needs*"),
+        # A single repetition failed any claim with one lost cube.
+        (0.05, ["--reps=1"], "passed", f"{UNDECIDED}(a claim needs*"),
+        (0.6, ["--reps=1", "--sim-strict"], "failed", TOO_FEW),
+        (0.6, ["--reps=1", "-o", "sim_strict=true"], "failed", TOO_FEW),
+        (0.6, ["--reps=5"], "passed", f"{UNDECIDED}100 * (about * more"),
+        (0.6, ["--reps=5", "--sim-strict"], "failed", "*inconclusive whether at least 90 %*"),
+        (0.6, ["--reps=5", "--sim-strict", "--sim-threshold=landed=0.3"], "passed", "*PASS*"),
     ],
 )
 def test_undecided(
-    pytester: pytest.Pytester, arguments: list[str], outcome: str, message: str
+    pytester: pytest.Pytester, duration: float, arguments: list[str], outcome: str, message: str
 ) -> None:
-    pytester.makepyfile(TEST)
+    pytester.makepyfile(TEST.format(duration=duration))
     result = pytester.runpytest_subprocess("--sim=mujoco", *arguments)
     result.assert_outcomes(**{outcome: 1})
     assert result.ret == (outcome == "failed")
-    if message:
-        result.stdout.fnmatch_lines([message])
-    assert "Traceback" not in result.stdout.str()
-
-
-def test_one_missed_landing_fails_nothing(pytester: pytest.Pytester) -> None:
-    """A single repetition passed any claim above 0 and failed it with one lost cube."""
-    pytester.makepyfile(TEST.replace("Falling()", "Falling(duration=0.05)"))
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=1")
-    result.assert_outcomes(passed=1)
-    result.stdout.fnmatch_lines(["UNDECIDED test_falling: landed >= 90 %: mujoco *(a claim needs*"])
-
-
-def test_the_ini_file_may_ask_for_it(pytester: pytest.Pytester) -> None:
-    pytester.makeini("[pytest]\nsim_strict = true\n")
-    pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=1")
-    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines([message])
+    no_traceback(result)
