@@ -1,4 +1,4 @@
-"""What users type and what they get, with a small task on the real MuJoCo."""
+"""What users type and what they get, with a small task on the real engines."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import numpy as np
 import psutil
 import pytest
 
-from tests.plugin.inner import CLAIMING, records
+from pytest_simbench.records.folder import RunFolder
+from tests.plugin.inner import CLAIMING, FALLING, records
 
 
 def test_ids_table_records_logs_and_traces(pytester: pytest.Pytester) -> None:
@@ -230,3 +231,62 @@ def test_gui_without_any_display_is_a_skip(
     result = pytester.runpytest_subprocess("--sim=mujoco", "--gui", "--reps=1", "-rs")
     result.assert_outcomes(skipped=1)
     result.stdout.fnmatch_lines(["*no display, and no Xvfb*"])
+
+
+TOLD = {
+    "pybullet": [
+        "body/*/gravity link/*/gravity: Bullet has one gravity for all (not told by the engine)",
+        "body/*/margin link/*/margin: Bullet's collision margin; a box has it within its faces, a "
+        "mesh outside (differs by at most 0.001)",
+    ],
+    "drake": [
+        "*/restitution: Drake has no restitution; its contacts dissipate (not told by the engine)",
+        "body/*/boxes: tuned: corners of free boxes are cut by 0.1 mm a face and rounded by a "
+        "sphere (differs by at most 0.0002)",
+    ],
+    "mujoco": ["contacts are soft by design: cubes sink in and creep a little"],
+}
+
+
+@pytest.mark.parametrize("name", TOLD)
+def test_declared_deviations_are_recorded_and_shown(pytester: pytest.Pytester, name: str) -> None:
+    pytester.makepyfile(test_it=FALLING)
+    result = pytester.runpytest_subprocess(
+        f"--sim={name}", "--reps=1", "-v", f"--sim-output={pytester.path / 'out'}"
+    )
+    assert result.ret == 0
+    recorded = records(pytester.path / "out")[0]["deviations"]
+    page = " ".join(result.stdout.str().split())
+    for text in TOLD[name]:
+        assert text in recorded
+        assert f"{name}: {' '.join(text.split())}" in page
+
+
+VERSIONS = """
+from dataclasses import dataclass, replace
+from tests.tiny import Falling
+
+@dataclass(frozen=True)
+class Versions(Falling):
+    def smoke(self):
+        return replace(self, duration=0.2)
+    def study(self):
+        return replace(self, duration=0.4)
+
+def test_versions(repeat):
+    repeat(Versions())
+"""
+
+
+@pytest.mark.parametrize(("protocol", "duration"), [("fast", 0.6), ("smoke", 0.2), ("paper", 0.4)])
+def test_the_protocols_version_is_run(
+    pytester: pytest.Pytester, protocol: str, duration: float
+) -> None:
+    pytester.makepyfile(VERSIONS)
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco", "--reps=1", f"--protocol={protocol}", "--sim-output=out"
+    )
+    result.assert_outcomes(passed=1)
+    (record,) = RunFolder(pytester.path / "out").read().records
+    assert record.settings["task.duration"] == duration
+    assert record.stepping["simulated"] == pytest.approx(duration)
