@@ -182,13 +182,8 @@ def _problems(readings: dict[str, Reading]) -> list[str]:
 
 
 def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, str]]:
-    """What the terminal shows of a result: titles, and the text below each.
-
-    Args:
-        written: the result.
-        width: of the terminal, in columns.
-        verbose: for whole tables.
-    """
+    """What a terminal of so many columns shows of a result: titles, and the text below each; whole
+    tables where `verbose`."""
     for scene in written.scenes:
         yield scene.title.lower(), for_terminal(render_section(scene, width, titled=False))
     if written.summaries or written.sweeps:
@@ -231,17 +226,8 @@ def _extras(
 def recordings(
     run: Path, target: Path, records: Sequence[Record], progress: Progress | None = None
 ) -> list[str]:
-    """Write the motions of a run as rosbag2 folders.
-
-    Args:
-        run: its folder, which holds the traces.
-        target: folder to write to.
-        records: of the run.
-        progress: the live line; None: one on standard output.
-
-    Returns:
-        Lines for the terminal.
-    """
+    """Write the motions of a run, whose folder holds the traces, as rosbag2 folders into another
+    one; lines for the terminal. Without a live line there is one on standard output."""
     count, problems = write_bags(run, target, records, progress or _printed())
     if not count:
         return [*problems, "no recordings: the run has no traces; see --sim-trace"]

@@ -41,10 +41,8 @@ def checked_task(value: Any, fixture: str) -> Task:
 def can_do(experiment: Experiment, skips: bool) -> Experiment:
     """An experiment whose robot can do the task; else the test fails before anything runs.
 
-    Args:
-        experiment: in question.
-        skips: the test is skipped instead, since nobody named the robot (`--robot=all`); so is that
-            of a task without a robot, but for the first robot's.
+    With `skips` it is skipped instead, since nobody named the robot (`--robot=all`); so is that of
+    a task without a robot, but for the first robot's.
     """
     problem = experiment.problem()
     if skips and problem:

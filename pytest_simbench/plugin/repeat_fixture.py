@@ -36,13 +36,7 @@ REFUSALS = (NotResumed, ExecutorError)
 
 
 class RepeatFixture:
-    """What the fixture `repeat` does, called with a task.
-
-    Args:
-        node: the test.
-        case: simulator and settings.
-        run: takes the records.
-    """
+    """What the fixture `repeat` does for a test, called with a task; the run takes the records."""
 
     def __init__(self, node: pytest.Item, case: Case, run: Run) -> None:
         self.node = node

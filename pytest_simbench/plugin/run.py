@@ -261,13 +261,8 @@ class Run:
     def summarise(
         self, reporter: pytest.TerminalReporter, comparison: Comparison | None, passed: bool
     ) -> None:
-        """Print the result and write the report files.
-
-        Args:
-            reporter: prints.
-            comparison: with a baseline, where there is one.
-            passed: whether tests and limits passed, for the badge.
-        """
+        """Print the result and write the report files; the badge says whether tests and limits
+        passed."""
         if self.mistake:
             reporter.write_line(f"ERROR: {for_terminal(self.mistake)}", red=True)
         if not self.reading.records and not (self.folder.path / NAME).is_file():

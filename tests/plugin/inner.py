@@ -32,6 +32,13 @@ def no_traceback(result: pytest.RunResult) -> None:
     assert "INTERNALERROR" not in text
 
 
+def usage_error(result: pytest.RunResult, *lines: str) -> None:
+    """Complain if a run did not end with exit code 4, these lines and no traceback."""
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(lines)
+    no_traceback(result)
+
+
 def distribution(
     site: Path, name: str, entries: str | bytes, module: str = "", metadata: bool = True
 ) -> Path:

@@ -9,7 +9,7 @@ from pytest_simbench.plugin import old_options
 from pytest_simbench.report.markdown.capabilities import capability_markdown
 from pytest_simbench.simulator.registry import adapter, registered
 from tests.cli.command import simbench
-from tests.plugin.inner import FALLING, distribution, importable
+from tests.plugin.inner import FALLING, distribution, importable, usage_error
 
 
 def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str) -> list[str]:
@@ -52,11 +52,11 @@ def test_an_old_option_is_a_command(
 
 def test_an_old_option_that_cannot_be(pytester: pytest.Pytester) -> None:
     result = pytester.runpytest_subprocess("--sim-merge", "none")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(
-        ["--sim-merge will go with the next release; write: simbench merge none",
-         "simbench merge: none: cannot read records from *"]
-    )  # fmt: skip
+    usage_error(
+        result,
+        "--sim-merge will go with the next release; write: simbench merge none",
+        "simbench merge: none: cannot read records from *",
+    )
 
 
 ADAPTERS = """

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.plugin.inner import records
+from tests.plugin.inner import records, usage_error
 
 TEST = """
     from tests.tiny import Falling
@@ -30,15 +30,12 @@ def test_a_folder_with_a_run_is_refused_before_anything_runs(pytester: pytest.Py
     for arguments in (["--sim-output=o", "--sim-set=mujoco.timestep=0.004"], ["--sim-output=o/."]):
         for more in ([], ["-n2"]):
             result = run(pytester, *arguments, *more)
-            assert result.ret == pytest.ExitCode.USAGE_ERROR
-            result.stderr.fnmatch_lines(["ERROR: *o already holds a run; complete that one with*"])
-            assert "Traceback" not in result.stderr.str() + result.stdout.str()
+            usage_error(result, "ERROR: *o already holds a run; complete that one with*")
     assert {path: path.read_bytes() for path in before} == before
     # The ini file names a folder for every run: those that record nothing may go on.
     pytester.makeini("[pytest]\nsim_output = o\n")
     result = run(pytester)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["ERROR: *already holds a run; *"])
+    usage_error(result, "ERROR: *already holds a run; *")
     result = run(pytester, "-n2")
     result.assert_outcomes(errors=1)
     result.stdout.fnmatch_lines(["*already holds a run; *"])

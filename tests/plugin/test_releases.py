@@ -8,7 +8,7 @@ import json
 import pytest
 
 from tests.cli.command import simbench
-from tests.plugin.inner import importable, records
+from tests.plugin.inner import importable, records, usage_error
 from tests.plugin.planted import plant
 
 
@@ -89,6 +89,4 @@ def test_wrong_input_is_one_sentence(
     pytester: pytest.Pytester, arguments: list[str], message: str
 ) -> None:
     result = pytester.runpytest_subprocess(*arguments)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"ERROR: *{message}"])
-    assert "Traceback" not in result.stdout.str() + result.stderr.str()
+    usage_error(result, f"ERROR: *{message}")
