@@ -36,13 +36,8 @@ ENDS = "ends"
 
 
 def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str]) -> int:
-    """Find it, say so, and return the exit code: 1 where the bad release is not worse.
-
-    Args:
-        wanted: the releases.
-        metric_name: what is worse in the bad one.
-        folder: of all runs.
-        arguments: tests and options of each run.
+    """Find it, say so, and return the exit code: 1 where the bad release is not worse. See `Search`
+    for the arguments.
 
     Raises:
         BadInput: no such simulator, release or metric; a run that ends with an error.

@@ -1,8 +1,9 @@
-"""`simbench install`, `uninstall`, `environments`: the environments of simulators."""
+"""`simbench install`, `uninstall`, `environments`, `download`: what this machine has besides."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from pytest_simbench.cli.names import progress
 from pytest_simbench.cli.values import BadInput
@@ -14,6 +15,8 @@ from pytest_simbench.client.environments import (
     remove,
     size_mb,
 )
+from pytest_simbench.data import sets
+from pytest_simbench.data.download import download as bring
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.simulator.registry import adapter
@@ -60,4 +63,16 @@ def list_environments() -> int:
             state = f"of no simulator that is known here: {error}"
         print(for_terminal(f"{folder.name}: {size:.0f} MB, {state}"))
     print(f"{total:.0f} MB in {default_folder()}")
+    return 0
+
+
+def download(names: Sequence[str], data: str | None) -> int:
+    """Bring data sets from their public sources into a folder, or into the usual one.
+
+    Raises:
+        DataError: there is no such set, or it cannot be had.
+    """
+    folder = Path(data) if data else sets.default_folder()
+    for wanted in [sets.data_set(name) for name in names]:
+        bring(wanted, folder, lambda text: print(for_terminal(text)))
     return 0

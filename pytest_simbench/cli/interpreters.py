@@ -23,10 +23,7 @@ MODELS = ("main_thread_only", "thread")
 def interpreter_path(text: str, where: str, here: Path) -> str:
     """The absolute path of an interpreter given as a path (`~` allowed) or by its name on PATH.
 
-    Args:
-        text: as the user gave it.
-        where: option and value, for the message.
-        here: folder where a relative path begins.
+    A relative path begins `here`; `where` is option and value, for the message.
 
     Raises:
         BadInput: there is none, or it cannot be executed.

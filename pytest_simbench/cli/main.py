@@ -9,9 +9,8 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib import import_module
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from pytest_simbench.cli import values as read
 
@@ -22,17 +21,9 @@ INTERRUPTED = 130
 """Exit code, as shells have it."""
 
 
-@dataclass(frozen=True)
-class Argument:
-    """An argument of a command.
-
-    Attributes:
-        name: as typed, or, without dashes, of the parameter that takes the values by their place.
-        type: makes the value of a text.
-        metavar: placeholder of the value in the help.
-        help: what it says.
-        nargs: how many values it takes, as argparse has it.
-    """
+class Argument(NamedTuple):
+    """An argument of a command, as argparse has it; its name is that of the parameter that takes
+    the values."""
 
     name: str
     type: Callable[[str], Any]
@@ -41,17 +32,13 @@ class Argument:
     nargs: str | None = None
 
 
-@dataclass(frozen=True)
-class Subcommand:
+class Subcommand(NamedTuple):
     """A command.
 
     Attributes:
-        name: of it.
         function: `module:name` of what does the work. It takes the arguments by their names; one
             called `main` takes the words and reads them itself.
-        help: what it does.
         more: a second sentence for its own help.
-        arguments: that it takes.
         verbose: what -v adds; empty for a command without it.
     """
 
@@ -90,7 +77,7 @@ COMMANDS = (
             (Argument("names", read.word, "NAME", "as simbench environments lists it", "+"),)),
     Subcommand("environments", "cli.environments:list_environments", "list the environments that "
             "are there, with their sizes"),
-    Subcommand("download", "cli.data_sets:download", "bring a measured data set from its public "
+    Subcommand("download", "cli.environments:download", "bring a measured data set from its public "
             "source", "", (
                 Argument("names", read.word, "NAME", "of a data set", "+"),
                 Argument("--data", read.file, "DIR", "folder to bring it to (default: "
@@ -136,13 +123,8 @@ def parser() -> Parser:
         about = f"{command.help[0].upper()}{command.help[1:]}. {command.more}".strip()
         one = commands.add_parser(command.name, help=command.help, description=about)
         for argument in command.arguments:
-            one.add_argument(
-                argument.name,
-                type=argument.type,
-                metavar=argument.metavar,
-                help=argument.help,
-                nargs=argument.nargs,
-            )
+            given = argument._asdict()
+            one.add_argument(given.pop("name"), **given)
         if command.verbose:
             one.add_argument("-v", "--verbose", action="store_true", help=command.verbose)
     return top

@@ -12,12 +12,9 @@ import shutil
 import stat
 import sys
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from pytest_simbench.cli.values import BadInput
+from pytest_simbench.cli.values import BadInput, refusing
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.settling import TASK as SETTLING
@@ -54,122 +51,87 @@ RUNS = ".simbench"
 """Where runs lie for which no folder is given."""
 
 
-@contextmanager
-def _refused(error: type[Exception], where: str = "") -> Iterator[None]:
-    """Make bad input of such errors in this block, after `WHERE: `."""
-    try:
-        yield
-    except error as reason:
-        raise BadInput(f"{where}: {reason}" if where else str(reason)) from None
+Folders = dict[str, RunFolder]
+"""Of runs, by the names that a user gave."""
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What is wanted of runs besides their tables.
+def _read(names: Sequence[str]) -> tuple[Folders, dict[str, Reading]]:
+    """Folders of runs, or of files of records, and what each holds.
 
-    Attributes:
-        output: folder to write to; None for the one of a single run, or a new one.
-        badge: file to write a badge into.
-        record: `mcap` for recordings of their motions.
-        verbose: whether whole tables are printed.
+    Raises:
+        BadInput: one cannot be read, or is named twice.
     """
+    folders: Folders = {}
+    readings: dict[str, Reading] = {}
+    files: set[Path] = set()
+    for name in names:
+        path = Path(name)
+        file = (path / RECORDS if path.is_dir() else path).resolve()
+        if file in files:
+            raise BadInput(f"{name}: the run is given twice")
+        folders[name] = RunFolder.of(path)
+        with refusing(RecordError, name):
+            readings[name] = folders[name].read()
+        files.add(file)
+    return folders, readings
 
-    output: str | None = None
-    badge: str | None = None
-    record: str | None = None
-    verbose: bool = False
+
+def _outcome(folders: Folders) -> tuple[Outcome, list[str]]:
+    """How runs ended together, and what is wrong with what says so. Whether the tests passed is not
+    known where one run does not know, and a comparison is that of one run alone."""
+    found = [Outcome.read(folder.path) for folder in folders.values()]
+    outcomes, wrong = [outcome for outcome, _ in found], [text for _, text in found if text]
+    if len(outcomes) == 1:
+        return outcomes[0], wrong
+    passed = [outcome.passed for outcome in outcomes]
+    together = False if False in passed else None if None in passed else True
+    return Outcome(together, looks=max(outcome.looks for outcome in outcomes)), wrong
 
 
-@dataclass(frozen=True)
-class Runs:
-    """Runs that a user named.
+def _merged(readings: dict[str, Reading]) -> tuple[list[Merged], Reading]:
+    """The records of runs as those of one: with where each comes from, and to be shown.
 
-    Attributes:
-        folders: of each, by its name.
-        readings: what each holds, by its name.
+    Raises:
+        BadInput: they are not parts of one run, or hold nothing.
     """
-
-    folders: dict[str, RunFolder]
-    readings: dict[str, Reading]
-
-    @property
-    def problems(self) -> list[str]:
-        """What is wrong with them, one sentence each."""
-        return [text for reading in self.readings.values() for text in reading.problems]
-
-    @classmethod
-    def named(cls, names: Sequence[str]) -> Runs:
-        """Those of these folders, or files of records.
-
-        Raises:
-            BadInput: one cannot be read, or is named twice.
-        """
-        folders: dict[str, RunFolder] = {}
-        readings: dict[str, Reading] = {}
-        files: set[Path] = set()
-        for name in names:
-            path = Path(name)
-            file = (path / RECORDS if path.is_dir() else path).resolve()
-            if file in files:
-                raise BadInput(f"{name}: the run is given twice")
-            folders[name] = RunFolder.of(path)
-            with _refused(RecordError, name):
-                readings[name] = folders[name].read()
-            files.add(file)
-        return cls(folders, readings)
-
-    def outcome(self) -> tuple[Outcome, list[str]]:
-        """How they ended together, and what is wrong with what says so. Whether the tests passed
-        is not known where one run does not know, and a comparison is that of one run alone."""
-        found = [Outcome.read(folder.path) for folder in self.folders.values()]
-        outcomes, wrong = [outcome for outcome, _ in found], [text for _, text in found if text]
-        if len(outcomes) == 1:
-            return outcomes[0], wrong
-        passed = [outcome.passed for outcome in outcomes]
-        together = False if False in passed else None if None in passed else True
-        return Outcome(together, looks=max(outcome.looks for outcome in outcomes)), wrong
-
-    def merged(self) -> tuple[list[Merged], Reading]:
-        """Their records as those of one run: with where each comes from, and to be shown.
-
-        Raises:
-            BadInput: they are not parts of one run, or hold nothing.
-        """
-        with _refused(MergeError):
-            records = merge({name: found.records for name, found in self.readings.items()})
-            tasks = merge_tasks({name: found.tasks for name, found in self.readings.items()})
-        if not records:
-            raise BadInput("none of the runs holds a repetition that ended")
-        return records, Reading(records=tuple(item.record for item in records), tasks=tasks)
+    with refusing(MergeError):
+        records = merge({name: found.records for name, found in readings.items()})
+        tasks = merge_tasks({name: found.tasks for name, found in readings.items()})
+    if not records:
+        raise BadInput("none of the runs holds a repetition that ended")
+    return records, Reading(records=tuple(item.record for item in records), tasks=tasks)
 
 
-def merge_runs(runs: Sequence[str], **wanted: Any) -> int:
+def merge_runs(
+    runs: Sequence[str], output: str | None = None, verbose: bool = False, **more: str | None
+) -> int:
     """Merge runs, print the result, and return the exit code.
 
     Args:
         runs: their folders.
-        wanted: see `Wanted`.
+        output: folder to write to; None for a new one.
+        verbose: whether whole tables are printed.
+        more: see `_extras`.
 
     Raises:
         BadInput: a run that cannot be read, runs that are not parts of one, or a folder that
             already holds a run or cannot be written to.
     """
-    found, asked = Runs.named(runs), Wanted(**wanted)
-    records, reading = found.merged()
-    folder = _locked(asked.output)
+    folders, readings = _read(runs)
+    records, reading = _merged(readings)
+    folder = _locked(output)
     try:
         for task in reading.tasks.values():
             folder.describe(task)
-        refused = _copy(records, found.folders, folder)
+        refused = _copy(records, folders, folder)
         unsaved = folder.flush()
-        outcome, wrong = found.outcome()
+        outcome, wrong = _outcome(folders)
         written = write_report(folder, looks=outcome.looks)
-        problems = [*found.problems, *refused, *unsaved, *written.problems, *wrong]
+        problems = [*_problems(readings), *refused, *unsaved, *written.problems, *wrong]
         ended = Outcome(outcome.passed, looks=outcome.looks)
         problems.append(write_outcome(folder.path, ended))
-        kept = reading.records
-        problems += _extras(asked, folder.path, folder.path, kept, outcome)
-        _print(asked, written, problems)
+        problems += _extras(folder.path, folder.path, reading.records, outcome, **more)
+        _print(written, verbose, problems)
         if written.complete and not unsaved:
             print(where(folder.path / PAGE_NAME, Path.cwd()))
     finally:
@@ -177,33 +139,31 @@ def merge_runs(runs: Sequence[str], **wanted: Any) -> int:
     return 0
 
 
-def report_runs(runs: Sequence[str], **wanted: Any) -> int:
+def report_runs(
+    runs: Sequence[str], output: str | None = None, verbose: bool = False, **more: str | None
+) -> int:
     """Show runs again: print the tables, write the report, and return the exit code.
 
-    One run's report is written into its folder, or into the one that is wanted; that of several,
-    which are merged for it, into the one that is wanted alone.
-
-    Args:
-        runs: their folders.
-        wanted: see `Wanted`.
+    One run's report is written into its folder, or into `output`; that of several, which are merged
+    for it, into `output` alone. See `merge_runs`.
 
     Raises:
         BadInput: a run that cannot be read, or runs that are not parts of one.
     """
-    found, asked = Runs.named(runs), Wanted(**wanted)
-    target = _target(asked.output, list(found.folders.values()))
-    (first, folder), *others = found.folders.items()
+    folders, readings = _read(runs)
+    target = _target(output, list(folders.values()))
+    (first, folder), *others = folders.items()
     run = None if others else folder.path
-    reading = found.merged()[1] if others else found.readings[first]
-    outcome, wrong = found.outcome()
+    reading = _merged(readings)[1] if others else readings[first]
+    outcome, wrong = _outcome(folders)
     tables, untold = ([], []) if run is None else write_tables(run, target)
     if not (reading.records or tables or untold):
         raise BadInput(f"{first}: it holds no repetition")
     compared = outcome.compared
     report = Report.of(reading, compared, outcome.looks)
     written = Written(**vars(report)) if target is None else write_files(target, report, run)
-    extras = _extras(asked, run, target, reading.records, outcome)
-    _print(asked, written, [*found.problems, *wrong, *written.problems, *extras])
+    extras = _extras(run, target, reading.records, outcome, **more)
+    _print(written, verbose, [*_problems(readings), *wrong, *written.problems, *extras])
     width = shutil.get_terminal_size().columns
     if compared is not None:
         name, gate = compared
@@ -217,14 +177,13 @@ def report_runs(runs: Sequence[str], **wanted: Any) -> int:
     return 0 if written.complete else 1
 
 
-def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, str]]:
-    """What the terminal shows of a result: titles, and the text below each.
+def _problems(readings: dict[str, Reading]) -> list[str]:
+    return [text for reading in readings.values() for text in reading.problems]
 
-    Args:
-        written: the result.
-        width: of the terminal, in columns.
-        verbose: for whole tables.
-    """
+
+def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, str]]:
+    """What a terminal of so many columns shows of a result: titles, and the text below each; whole
+    tables where `verbose`."""
     for scene in written.scenes:
         yield scene.title.lower(), for_terminal(render_section(scene, width, titled=False))
     if written.summaries or written.sweeps:
@@ -238,49 +197,37 @@ def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, 
         yield "history", for_terminal("\n".join(history_lines(written.histories, width)))
 
 
-def _print(asked: Wanted, written: Written, problems: Iterable[str]) -> None:
+def _print(written: Written, verbose: bool, problems: Iterable[str]) -> None:
     width = shutil.get_terminal_size().columns
-    for number, (title, text) in enumerate(sections(written, width, asked.verbose)):
+    for number, (title, text) in enumerate(sections(written, width, verbose)):
         print(f"\n{title}\n{text}" if number else text)
     for problem in filter(None, problems):
         print(for_terminal(problem))
 
 
 def _extras(
-    asked: Wanted,
     run: Path | None,
     target: Path | None,
     records: Sequence[Record],
     outcome: Outcome,
+    badge: str | None = None,
+    record: str | None = None,
 ) -> list[str]:
-    """Write badge and recordings where they are wanted; lines for the terminal."""
-    lines = [badge(asked.badge, records, outcome.passed)]
-    if asked.record and run is not None and target is not None:
+    """Write the badge into the file `badge`, and with `record` recordings of the motions, where
+    they are wanted; lines for the terminal."""
+    lines = [write_badge(Path(badge), records, outcome.passed)] if badge else []
+    if record and run is not None and target is not None:
         lines += recordings(run, target, records)
-    elif asked.record:
+    elif record:
         lines.append("no recordings: join the runs with simbench merge first")
     return lines
-
-
-def badge(file: str | None, records: Sequence[Record], passed: bool | None) -> str:
-    """Write the badge, if one is asked for; a sentence when it could not be written."""
-    return write_badge(Path(file), records, passed) if file else ""
 
 
 def recordings(
     run: Path, target: Path, records: Sequence[Record], progress: Progress | None = None
 ) -> list[str]:
-    """Write the motions of a run as rosbag2 folders.
-
-    Args:
-        run: its folder, which holds the traces.
-        target: folder to write to.
-        records: of the run.
-        progress: the live line; None: one on standard output.
-
-    Returns:
-        Lines for the terminal.
-    """
+    """Write the motions of a run, whose folder holds the traces, as rosbag2 folders into another
+    one; lines for the terminal. Without a live line there is one on standard output."""
     count, problems = write_bags(run, target, records, progress or _printed())
     if not count:
         return [*problems, "no recordings: the run has no traces; see --sim-trace"]
@@ -329,7 +276,7 @@ BESIDE = ("traces/{}.npz", "pictures/{}.npz", "videos/{}.mp4")
 """What else a run folder may hold of a repetition, named as its log is."""
 
 
-def _copy(records: list[Merged], folders: dict[str, RunFolder], to: RunFolder) -> list[str]:
+def _copy(records: list[Merged], folders: Folders, to: RunFolder) -> list[str]:
     """Write the records, with their logs and what else there is of them (`BESIDE`) under the names
     that they have in the whole.
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import argparse
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
@@ -50,6 +51,20 @@ class BadValue(BadInput, argparse.ArgumentTypeError):
     def sentence(self, name: str) -> str:
         """What is wrong with the value of the option, ini option or mark `name`."""
         return f"{name}={shown(self.text)}: {self.advice}"
+
+
+@contextmanager
+def refusing(
+    errors: type[Exception] | tuple[type[Exception], ...],
+    where: str = "",
+    kind: Callable[[str], BaseException] = BadInput,
+) -> Iterator[None]:
+    """Make bad input, or what `kind` makes of a sentence, of these errors in this block: in their
+    own words, after `WHERE: `."""
+    try:
+        yield
+    except errors as error:
+        raise kind(f"{where}: {error}" if where else str(error)) from None
 
 
 def shown(value: object, longest: int = 60) -> str:

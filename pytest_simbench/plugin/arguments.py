@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import pytest
 
-from pytest_simbench.cli.values import ANY_NUMBER, BadValue, shown
+from pytest_simbench.cli.values import ANY_NUMBER, BadValue, refusing, shown
 
 if TYPE_CHECKING:
     from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.tasks.base import Task
 
 
+_failure = partial(pytest.fail.Exception, pytrace=False)
+
+failing = partial(refusing, kind=_failure)
+"""Fails the test in place of errors in a block, with their sentences alone."""
+
+
 def _refuse(sentence: str) -> NoReturn:
-    pytest.fail(sentence, pytrace=False)
+    raise _failure(sentence)
 
 
 def checked_task(value: Any, fixture: str) -> Task:
@@ -34,10 +41,8 @@ def checked_task(value: Any, fixture: str) -> Task:
 def can_do(experiment: Experiment, skips: bool) -> Experiment:
     """An experiment whose robot can do the task; else the test fails before anything runs.
 
-    Args:
-        experiment: in question.
-        skips: the test is skipped instead, since nobody named the robot (`--robot=all`); so is that
-            of a task without a robot, but for the first robot's.
+    With `skips` it is skipped instead, since nobody named the robot (`--robot=all`); so is that of
+    a task without a robot, but for the first robot's.
     """
     problem = experiment.problem()
     if skips and problem:
@@ -70,13 +75,8 @@ def checked_settings(value: Any, simulator: str, profile: str) -> dict[str, Any]
             f"the fixture sim_settings gives {shown(repr(value))}; it must give a dict of settings "
             "by name, {'timestep': 0.001} for instance"
         )
-    problem = ""  # refused outside of `except`, else pytest shows both exceptions
-    try:
+    with failing(SettingsError, "the fixture sim_settings"):
         settings_of(simulator, profile, value)
-    except SettingsError as error:
-        problem = str(error)
-    if problem:
-        _refuse(f"the fixture sim_settings: {problem}")
     return dict(value)
 
 

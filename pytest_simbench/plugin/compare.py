@@ -90,12 +90,8 @@ def prepare(
     """The comparison that the options ask for; None when nothing is to be compared with.
 
     Limits in the ini file hold whenever there is a baseline and wait for one otherwise; limits on
-    the command line need one.
-
-    Args:
-        config: of the run.
-        saved: contents of the pytest-benchmark files that `--benchmark-compare` chose.
-        simulators: of the run, of which `--sim-baseline` may name one.
+    the command line need one. `saved` are the contents of the pytest-benchmark files that
+    `--benchmark-compare` chose; of the run's simulators `--sim-baseline` may name one.
 
     Raises:
         pytest.UsageError: no baseline, a malformed one, a malformed limit, an unknown metric.

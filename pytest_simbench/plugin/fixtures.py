@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import closing
-from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import arguments, benchmark, cluster, data, options, prefetch, recording
+from pytest_simbench.plugin import arguments, benchmark, inputs, options
+from pytest_simbench.plugin.cases import case_of, expected, on_this_machine
 from pytest_simbench.plugin.registration import is_conftest
 from pytest_simbench.plugin.session import REPEATED, session_of
 
 if TYPE_CHECKING:
-    from pytest_simbench.client.display import Displays
     from pytest_simbench.client.resources import ResourceSampler
     from pytest_simbench.client.world import World
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.handle import SimulatorHandle
     from pytest_simbench.measure.results import ResultSet
     from pytest_simbench.plugin.repeatability import Perturber
-    from pytest_simbench.plugin.run import Run
     from pytest_simbench.plugin.variants import Variant
     from pytest_simbench.repeatability.replay import Replay
     from pytest_simbench.scene import Robot, Scene
@@ -32,9 +31,6 @@ if TYPE_CHECKING:
 
 OWN = ("sim_", "simbench_")
 """How names begin that no other plugin has; pytest-playwright has an `output_path` too."""
-
-OF_CASES = ("fresh", "stall_timeout", "memory_limit", "seed", "jitter")
-"""Options of the same name as an attribute of `Case`, behind `sim_`."""
 
 
 def free_fixtures(plugins: pytest.PytestPluginManager) -> ModuleType:
@@ -99,66 +95,6 @@ def output_path(request: pytest.FixtureRequest) -> Path:
     return session_of(request.config).run.use()
 
 
-def case_of(
-    config: pytest.Config,
-    made_for: Variant,
-    item: pytest.Item | None = None,
-    settings: Any = None,
-) -> Case:
-    """What the options say of a simulator's repetitions, and of a test's own.
-
-    Args:
-        config: of the run.
-        made_for: simulator, mode, profile, time step and robot.
-        item: the test; None for the handle that all tests share.
-        settings: that the test changes, unchecked.
-    """
-    from pytest_simbench.experiment.case import PROTOCOLS, Case
-    from pytest_simbench.plugin.marks import number_mark
-    from pytest_simbench.plugin.variants import named
-
-    name, mode = made_for.simulator, made_for.mode
-    session = session_of(config)
-    chosen, this = session.selection, session.run
-    elsewhere = cluster.asked(config)  # nodes find interpreters and displays themselves
-    timeout, of_test = options.value(config, "sim_timeout"), {"test": "simulator"}
-    own: Mapping[str, Any] = {}
-    if item is not None:
-        function, others = named(item, made_for.id_with(len(chosen.profiles)))
-        of_test = {"test": item.nodeid, "function": function, "variant": others}
-        timeout = timeout if timeout is not None else number_mark(item, "sim_timeout")
-        own = arguments.checked_settings(settings, name, made_for.profile)
-    return Case.of(
-        name,
-        python=chosen.pythons.get(name),
-        mode=mode,
-        profile=made_for.profile,
-        own_timestep=made_for.own_timestep,
-        folder=this.use(),
-        changes={**own, **chosen.changes_of(name), **made_for.changes},
-        spec=chosen.specs.get(name),
-        robot=chosen.robots[made_for.robot],
-        display=_display(this) if mode == "gui" and not elsewhere else None,
-        protocol=PROTOCOLS[options.value(config, "sim_protocol")],
-        trace=recording.trace_mode(config),
-        video=recording.video_mode(config, name),
-        timeout=timeout,
-        **{name: options.value(config, f"sim_{name}") for name in OF_CASES},
-        **of_test,
-    )
-
-
-def _display(this: Run) -> Displays:
-    """The displays of a run, if there are any; skips the test where there are none."""
-    from pytest_simbench.client.errors import DisplayError
-
-    try:
-        this.displays.environment()
-    except DisplayError as error:
-        pytest.skip(str(error))
-    return this.displays
-
-
 @pytest.fixture
 def simbench_case(
     request: pytest.FixtureRequest, sim_case: Variant, sim_settings: dict[str, Any]
@@ -167,23 +103,10 @@ def simbench_case(
     return case_of(request.config, sim_case, request.node, sim_settings)
 
 
-def _on_this_machine(config: pytest.Config, case: Case) -> Case:
-    """A case for a worker of this machine, whatever `--sim-cluster` says; skips the test where its
-    simulator is not here."""
-    if not cluster.asked(config):
-        return case
-    from pytest_simbench.client.environments import missing
-    from pytest_simbench.simulator.registry import adapter
-
-    if reason := missing(adapter(case.simulator).info):
-        pytest.skip(f"only `repeat` goes to the cluster, this runs here, and {reason}")
-    return replace(case, display=_display(session_of(config).run) if case.mode == "gui" else None)
-
-
 @pytest.fixture
 def simbench_case_here(request: pytest.FixtureRequest, simbench_case: Case) -> Case:
     """The same for workers of this machine."""
-    return _on_this_machine(request.config, simbench_case)
+    return on_this_machine(request.config, simbench_case)
 
 
 @pytest.fixture
@@ -194,7 +117,7 @@ def repeat(
     from pytest_simbench.plugin.repeat_fixture import RepeatFixture
 
     run = session_of(request.config).run
-    run.expected = lambda: prefetch.expected(request.config, request.session.items, case_of)
+    run.expected = partial(expected, request.session)
     repeat = RepeatFixture(request.node, simbench_case, run)
     done: list[Task] = []
 
@@ -278,7 +201,7 @@ def data_set(request: pytest.FixtureRequest) -> Callable[[str], Any]:
 
     The test is skipped where the set is not on this machine, with the command that brings it.
     """
-    return lambda name: data.read_or_skip(request.config, name)
+    return lambda name: inputs.read_or_skip(request.config, name)
 
 
 @pytest.fixture
@@ -289,10 +212,8 @@ def scene_file(request: pytest.FixtureRequest, output_path: Path) -> Callable[..
     Paths are relative to the test's file; without any it is the file of `--sim-scene`. What of the
     file was carried, and what not, is written into the run folder.
     """
-    from pytest_simbench.plugin.scene_files import load
-
     tell = session_of(request.config).run.tell
-    return lambda path=None, starts=None: load(request, output_path, tell, path, starts)
+    return partial(inputs.load_scene, request, output_path, tell)
 
 
 @pytest.fixture(scope="session")
@@ -325,7 +246,7 @@ def simbench_handle(request: pytest.FixtureRequest, sim_case: Variant) -> Iterat
     """The session's handle, whatever is named `simulator` here."""
     from pytest_simbench.experiment.handle import SimulatorHandle
 
-    case = _on_this_machine(request.config, case_of(request.config, sim_case))
+    case = on_this_machine(request.config, case_of(request.config, sim_case))
     with closing(SimulatorHandle(case)) as handle:
         yield handle
 

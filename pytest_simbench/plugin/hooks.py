@@ -1,4 +1,5 @@
-"""pytest's hooks. Loaded in every pytest run where the package is installed, so it stays light."""
+"""pytest's hooks, but for those of `SimSession`. Loaded in every pytest run where the package is
+installed, so it stays light."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.plugin import old_options, options, registration, sanitise, scene_files
+from pytest_simbench.plugin import inputs, old_options, options, registration, sanitise
 from pytest_simbench.plugin.session import REPEATED, fixtures_of, session_of
 
 MARKS = (
@@ -58,18 +59,13 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(fixtures.free_fixtures(config.pluginmanager), "simbench-fixtures")
     if not (config.getoption("help") or config.getoption("version")):
         session.check_options()
-        scene_files.run_suite(config)
+        inputs.run_suite(config)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_benchmark_compare_machine_info(config: pytest.Config, compared_benchmark: Any) -> None:
     """Keep the saved run that `--benchmark-compare` chose; of several, the newest comes last."""
     session_of(config).saved.append(compared_benchmark)
-
-
-@pytest.hookimpl(tryfirst=True)  # before xdist starts its workers
-def pytest_sessionstart(session: pytest.Session) -> None:
-    session_of(session.config).start()
 
 
 def pytest_cmdline_main(config: pytest.Config) -> int | None:
@@ -97,15 +93,6 @@ def pytest_report_collectionfinish(config: pytest.Config, items: list[pytest.Ite
     return options.taken_names(config) if ours else []
 
 
-def pytest_collection_finish(session: pytest.Session) -> None:
-    session_of(session.config).lock(session.items)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_configure_node(node: Any) -> None:
-    session_of(node.config).tell_worker(node)
-
-
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_setup() -> Generator[None, Any, Any]:
     """A test that asks for what this machine lacks is skipped, with the reason."""
@@ -124,12 +111,6 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     found = yield from pytest_runtest_setup()
     item.stash.get(REPEATED, lambda: None)()
     return found
-
-
-@pytest.hookimpl(hookwrapper=True)
-def pytest_runtest_makereport(item: pytest.Item, call: Any) -> Any:
-    outcome = yield
-    session_of(item.config).attach(item, outcome.get_result())
 
 
 @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
@@ -151,7 +132,3 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, exitstatu
     ours = session_of(terminalreporter.config)
     with ours.interruptible():
         ours.summarise(terminalreporter, exitstatus)
-
-
-def pytest_unconfigure(config: pytest.Config) -> None:
-    session_of(config).close()

@@ -54,7 +54,7 @@ def _among(asked: Sequence[str], name: str) -> bool:
 def _marks(node: Any, variant: Variant, selection: Selection) -> list[pytest.MarkDecorator]:
     name, mode = variant.simulator, variant.mode
     marks = []
-    reason = selection.missing(name, (variant.profile,))
+    reason = selection.missing(name, variant.profile)
     if reason:
         marks.append(pytest.mark.skip(reason=reason))
     if registry.problem(name):

@@ -18,30 +18,19 @@ from pytest_simbench.plugin import options
 
 
 class OldOption(NamedTuple):
-    """What an old option stands for.
-
-    Attributes:
-        flag: the option.
-        command: its name.
-        values: how many values the option takes, as argparse has it; 0 for none.
-    """
+    """An old option, the command that it stands for, and how many values it takes."""
 
     flag: str
     command: str
     values: int | str = 0
 
     @property
-    def dest(self) -> str:
-        """What argparse calls its values."""
-        return f"simbench_command{self.flag}"
-
-    @property
     def arguments(self) -> dict[str, Any]:
         """What argparse is told of it."""
-        taken = {"action": "extend", "nargs": self.values}
-        flag = {"action": "store_true"}
-        hidden = {"dest": self.dest, "default": None, "help": argparse.SUPPRESS}
-        return {**hidden, **(taken if self.values else flag)}
+        more = (
+            {"action": "extend", "nargs": self.values} if self.values else {"action": "store_true"}
+        )
+        return {"dest": self.flag, "default": None, "help": argparse.SUPPRESS, **more}
 
 
 OLD_OPTIONS = (
@@ -66,14 +55,14 @@ CARRIED = {"sim_output": "--output", "sim_badge": "--badge", "sim_record": "--re
 
 def asked(config: pytest.Config) -> OldOption | None:
     """The first of the old options that is on the command line."""
-    return next((old for old in OLD_OPTIONS if getattr(config.option, old.dest, None)), None)
+    return next((old for old in OLD_OPTIONS if getattr(config.option, old.flag, None)), None)
 
 
 def run_command(config: pytest.Config, old: OldOption) -> int:
     """Do what an old option asks for, by the command; the exit code, as pytest has it."""
     from pytest_simbench.cli.main import BAD_INPUT, COMMANDS, INTERRUPTED, main
 
-    values = getattr(config.option, old.dest)
+    values = getattr(config.option, old.flag)
     if old.command == "bisect":
         return _bisect(config, *values)
     (command,) = (command for command in COMMANDS if command.name == old.command)

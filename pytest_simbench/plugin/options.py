@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -176,15 +175,8 @@ OPTIONS = (
 _BY_NAME = {item.name: item for item in OPTIONS}
 
 
-@contextmanager
-def refusing(
-    errors: type[Exception] | tuple[type[Exception], ...], where: str = ""
-) -> Iterator[None]:
-    """Make usage errors of these errors in this block, in their own words, after `WHERE: `."""
-    try:
-        yield
-    except errors as error:
-        raise pytest.UsageError(f"{where}: {error}" if where else str(error)) from None
+refusing = partial(read.refusing, kind=pytest.UsageError)
+"""Makes usage errors of others in a block: `with refusing(OSError, "--sim-output"):`."""
 
 
 INI: pytest.StashKey[frozenset[str]] = pytest.StashKey()

@@ -42,14 +42,9 @@ def photograph(
     records: Sequence[Record],
     tell: Callable[[str], object],
 ) -> None:
-    """Have the pictures and the film taken that are of a repetition of their own.
-
-    Args:
-        config: of pytest.
-        experiment: whose repetitions have been done.
-        records: of them; they tell what became of their own films.
-        tell: takes a sentence for the end of the run.
-    """
+    """Have the pictures and the film taken that are of a repetition of their own, when the others
+    are done: their records say what became of their films. `tell` takes a sentence for the end of
+    the run."""
     pictures, video = options.value(config, PICTURES), options.value(config, VIDEO)
     if not pictures and video == "off":
         return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from math import isfinite
 from typing import Any
 
@@ -20,7 +19,7 @@ from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.verdicts import Judgement
 from pytest_simbench.measure.verdicts import Verdict as DataVerdict
 from pytest_simbench.plugin import options, recording
-from pytest_simbench.plugin.arguments import can_do
+from pytest_simbench.plugin.arguments import can_do, failing
 from pytest_simbench.plugin.benchmark import give_rounds
 from pytest_simbench.plugin.marks import number_mark
 from pytest_simbench.plugin.resume import NotResumed
@@ -32,15 +31,12 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.base import Task
 
+REFUSALS = (NotResumed, ExecutorError)
+"""Errors whose sentences fail the test."""
+
 
 class RepeatFixture:
-    """What the fixture `repeat` does, called with a task.
-
-    Args:
-        node: the test.
-        case: simulator and settings.
-        run: takes the records.
-    """
+    """What the fixture `repeat` does for a test, called with a task; the run takes the records."""
 
     def __init__(self, node: pytest.Item, case: Case, run: Run) -> None:
         self.node = node
@@ -56,7 +52,7 @@ class RepeatFixture:
         skips = session_of(self.node.config).selection.every_robot
         experiment = can_do(Experiment(self.case, task), skips)
         experiment = experiment.in_case(attempt=self.run.begin(experiment))
-        with _refusals_fail_the_test():
+        with failing(REFUSALS):
             found = self.run.take(experiment, wanted if isinstance(wanted, int) else None)
         self.run.describe(experiment.task)
         self.described[experiment.task.name] = TaskDescription.of(experiment.task)
@@ -89,12 +85,12 @@ class RepeatFixture:
         missing = [k for k in range(1, number + 1) if k not in found]
         if missing:
             if self.run.resumed is not None and not self._may_resume:
-                with _refusals_fail_the_test():
+                with failing(REFUSALS):
                     self.run.resumed.check_versions(experiment, self.run.executor)
                 self._may_resume = True
             self.run.begin_lines()
             run = self.run
-            with _refusals_fail_the_test():
+            with failing(REFUSALS):
                 repeater = Repeater(experiment, run.executor, run.progress, run.folder.append)
                 found |= {r.repetition: r for r in repeater.run(missing).records}
         return [found[k] for k in sorted(found)]
@@ -109,11 +105,9 @@ class RepeatFixture:
             most = options.value(config, "sim_crashes")
         if most is None:
             most = 0.0 if self.case.own_timestep is None else 1.0
-        try:
+        with failing(AssertionError):
             for result in self.results:
                 result.check_crashes(most)
-        except AssertionError as error:
-            pytest.fail(str(error), pytrace=False)
 
     def finish(self, benchmark: Any) -> None:
         """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
@@ -151,16 +145,6 @@ def claim_of(case: Case, result: ResultSet, metric: Metric, judgement: Judgement
         crashed=len(result.crashed),
         advice=judgement.advice,
     )
-
-
-@contextmanager
-def _refusals_fail_the_test() -> Iterator[None]:
-    try:
-        yield
-        return
-    except (NotResumed, ExecutorError) as error:
-        refusal = str(error)
-    pytest.fail(refusal, pytrace=False)
 
 
 def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:

@@ -64,10 +64,7 @@ class NotResumed(Exception):
 
 
 class Resumed:
-    """What an interrupted run has recorded.
-
-    Args:
-        folder: of the run.
+    """What an interrupted run has recorded in its folder.
 
     Attributes:
         records: all of them, interrupted ones too.
@@ -104,9 +101,7 @@ class Resumed:
         Settings, seeds, versions and whatever else `records.configuration` lists are held against
         what the options say now, without starting a worker.
 
-        Args:
-            experiment: as asked for now.
-            wanted: repetitions that the user asked for by number; None: as many as it takes.
+        `wanted` repetitions were asked for by number; None: as many as it takes.
 
         Raises:
             NotResumed: the records are of another configuration.
@@ -136,10 +131,6 @@ class Resumed:
 
     def check_versions(self, experiment: Experiment, executor: Executor) -> None:
         """Before repetitions are added: ask a worker for what only it can tell.
-
-        Args:
-            experiment: as asked for now.
-            executor: where they will run.
 
         Raises:
             NotResumed: the versions are not those of the run.

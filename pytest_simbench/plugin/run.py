@@ -32,7 +32,7 @@ from pytest_simbench.records.folder import Reading, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import NAME
-from pytest_simbench.report.files import write_outcome, write_report
+from pytest_simbench.report.files import write_badge, write_outcome, write_report
 from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.markdown.github import append_summary
 from pytest_simbench.report.model.outcome import Outcome
@@ -51,7 +51,7 @@ class Run:
         mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
         page: to look at, once the whole report is written.
-        expected: what later tests will ask for, see `prefetch`; set before the first one asks.
+        expected: what later tests will ask for; set before the first one asks.
     """
 
     def __init__(self, config: pytest.Config) -> None:
@@ -261,13 +261,8 @@ class Run:
     def summarise(
         self, reporter: pytest.TerminalReporter, comparison: Comparison | None, passed: bool
     ) -> None:
-        """Print the result and write the report files.
-
-        Args:
-            reporter: prints.
-            comparison: with a baseline, where there is one.
-            passed: whether tests and limits passed, for the badge.
-        """
+        """Print the result and write the report files; the badge says whether tests and limits
+        passed."""
         if self.mistake:
             reporter.write_line(f"ERROR: {for_terminal(self.mistake)}", red=True)
         if not self.reading.records and not (self.folder.path / NAME).is_file():
@@ -292,7 +287,8 @@ class Run:
         baseline, report = found or ("", None)
         outcome = Outcome(passed, baseline, report, looks)
         problems.append(write_outcome(path, outcome))
-        problems.append(runs.badge(options.value(self.config, "sim_badge"), records, passed))
+        if badge := options.value(self.config, "sim_badge"):
+            problems.append(write_badge(Path(badge), records, passed))
         problems += recorded
         if written.complete and not unsaved:
             self.page = path / PAGE_NAME

@@ -3,7 +3,7 @@ installed where that is asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import pytest
@@ -69,7 +69,7 @@ class Selection:
     def _of_one_robot(self, name: str, mode: str) -> list[Variant]:
         found = []
         for profile in self.profiles:
-            unknown = registry.problem(name) or self.settings_problem(name, (profile,))
+            unknown = registry.problem(name) or self.settings_problem(name, profile)
             if self.sweep is None or unknown:
                 found.append(Variant(name, mode, profile))
             else:
@@ -81,15 +81,10 @@ class Selection:
         """Changed settings of a simulator."""
         return {**self.changes.get(base_name(name), {}), **self.changes.get(name, {})}
 
-    def missing(self, name: str, profiles: Sequence[str] = ()) -> str | None:
-        """Why a simulator cannot run here, or on the cluster, with what mends it; None when it
-        can.
-
-        Args:
-            name: of the simulator.
-            profiles: that it needs; none for all of the run.
-        """
-        found = registry.problem(name) or self.settings_problem(name, profiles)
+    def missing(self, name: str, profile: str) -> str | None:
+        """Why a simulator cannot run in a profile here, or on the cluster, with what mends it; None
+        when it can."""
+        found = registry.problem(name) or self.settings_problem(name, profile)
         if found:
             return found
         if self.nodes:
@@ -101,14 +96,10 @@ class Selection:
 
     def unusable(self, name: str, to_install: bool = False) -> str | None:
         """Why a simulator cannot run in any of the profiles; None when it can. Tests in those that
-        one lacks are skipped, with the reason.
-
-        Args:
-            name: of the simulator.
-            to_install: whether a missing environment is no fault, since it will be made.
-        """
+        one lacks are skipped, with the reason. A missing environment is no fault where it is
+        `to_install`."""
         why = self.settings_problem if to_install else self.missing
-        reasons = [why(name, (profile,)) for profile in self.profiles]
+        reasons = [why(name, profile) for profile in self.profiles]
         return reasons[0] if all(reasons) else None
 
     def _settings(self, name: str, profile: str) -> Settings:
@@ -119,11 +110,10 @@ class Selection:
         """
         return registry.settings_of(name, profile, self.changes_of(name))
 
-    def settings_problem(self, name: str, profiles: Sequence[str] = ()) -> str | None:
+    def settings_problem(self, name: str, profile: str) -> str | None:
         """Why a simulator has no such profile, or cannot take a change; None when it can."""
         try:
-            for profile in profiles or self.profiles:
-                self._settings(name, profile)
+            self._settings(name, profile)
         except SettingsError as error:
             return str(error)
         return None
@@ -220,8 +210,9 @@ def check(selection: Selection, makes: bool) -> None:
             "interpreter (python=...), so give one of them"
         )
     for name in selection.changes:
-        if refused := selection.settings_problem(name):
-            raise BadInput(refused)
+        for profile in selection.profiles:
+            if refused := selection.settings_problem(name, profile):
+                raise BadInput(refused)
     for name in selection.named:
         if reason := selection.unusable(name, to_install=makes):
             raise BadInput(reason)

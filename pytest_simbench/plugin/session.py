@@ -6,14 +6,14 @@ Imported at plugin load: standard library and pytest only; everything else is im
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from pytest_simbench.plugin import cluster, data, options, recording, scene_files
+from pytest_simbench.plugin import cluster, inputs, options, recording
 
 if TYPE_CHECKING:
     from pytest_simbench.plugin.compare import Comparison
@@ -33,8 +33,8 @@ takes imports."""
 
 
 class SimSession:
-    """One pytest process, from its options to its summary. Also a plugin, for the hook that gets no
-    config.
+    """One pytest process, from its options to its summary. Also a plugin: some of
+    pytest's hooks are its own.
 
     Attributes:
         config: of the process.
@@ -90,18 +90,17 @@ class SimSession:
         ):
             _ = self.selection
 
-    def start(self) -> None:
+    @pytest.hookimpl(tryfirst=True)  # before xdist starts its workers
+    def pytest_sessionstart(self) -> None:
         """Complain of a bad baseline, limit, threshold or folder before anything runs."""
         config = self.config
-        data.check(config)
-        if not self.in_worker:
-            scene_files.check(config)
         if options.given(config, "sim_threshold"):
             from pytest_simbench.plugin.thresholds import bad_value, typed
 
             if wrong := bad_value(typed(config)):
                 raise pytest.UsageError(wrong)
         if not self.in_worker:
+            inputs.check(config)
             recording.check(config)
         named = any(options.given(config, name) for name in ("sim_output", "sim_resume"))
         if named and self._alone:
@@ -167,12 +166,13 @@ class SimSession:
 
             time_by_workers(self.config.pluginmanager, timed)
 
-    def lock(self, items: Iterable[pytest.Item]) -> None:
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
         """Complain of a run folder that the ini file names, if a test needs one, before it runs."""
-        if self._alone and any("sim_case" in fixtures_of(item) for item in items):
+        if self._alone and any("sim_case" in fixtures_of(item) for item in session.items):
             self.run.lock()
 
-    def tell_worker(self, node: Any) -> None:
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_configure_node(self, node: Any) -> None:
         """Tell an xdist worker which run folder all share, why it cannot be used, and where the
         slots of `--sim-jobs` are given out."""
         run = self.run
@@ -182,17 +182,20 @@ class SimSession:
         node.workerinput["simbench_folder"] = str(run.folder.path.absolute())
         node.workerinput["simbench_problem"] = run.problem
 
-    def attach(self, item: pytest.Item, report: Any) -> None:
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(self, item: pytest.Item) -> Generator[None, Any, Any]:
         """Have a test's records travel with its report, to an xdist controller for instance; and of
         one that failed what it was of."""
+        report = yield
         if not self.begun:
-            return
+            return report
         if report.when == "call" and (lines := self.run.of_test(item.nodeid)):
             report.simbench = lines
         if report.failed and "sim_case" in fixtures_of(item):
             from pytest_simbench.plugin.marks import describe_failure
 
             report.simbench_failed = describe_failure(item, report, len(self.selection.profiles))
+        return report
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Keep what came with a report until all tests have ended."""
@@ -260,7 +263,7 @@ class SimSession:
 
             reporter.write_line(where(self.run.page, self.config.invocation_params.dir))
 
-    def close(self) -> None:
+    def pytest_unconfigure(self) -> None:
         """End what the run started."""
         cluster.leave(self.config)
         if self.begun:

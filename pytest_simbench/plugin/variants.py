@@ -76,13 +76,8 @@ def named(item: pytest.Item, own: str) -> tuple[str, str]:
 def variants(
     simulator: str, mode: str, profile: str, own: float, asked: bool | Sequence[float]
 ) -> list[Variant]:
-    """The variants of one simulator, mode and profile: one for each time step.
-
-    Args:
-        simulator, mode, profile: which.
-        own: time step of the profile [s].
-        asked: for which time steps [s]; True for those around its own.
-    """
+    """The variants of one simulator, mode and profile, whose own time step is `own` [s]: one for
+    each that is asked for [s]; True stands for those around its own."""
     steps = around(own) if isinstance(asked, bool) else asked
     plain = Variant(simulator, mode, profile)
     return [

@@ -10,20 +10,12 @@ import pytest
 
 from pytest_simbench.cli.interpreters import checked_specification, interpreter_path
 from pytest_simbench.cli.values import BadInput
-from pytest_simbench.plugin.selection import select
+from tests.plugin.inner import wrapper
 
 
 @pytest.fixture
 def here(tmp_path: Path) -> Path:
     return tmp_path
-
-
-def wrapper(path: Path, executable: bool = True) -> Path:
-    """An interpreter that is this one under another path."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(f'#!/bin/sh\nexec {sys.executable} "$@"\n')
-    path.chmod(0o755 if executable else 0o644)
-    return path
 
 
 @pytest.mark.parametrize(
@@ -44,7 +36,7 @@ def wrapper(path: Path, executable: bool = True) -> Path:
 def test_no_interpreter(here: Path, text: str, message: str) -> None:
     (here / "folder").mkdir()
     wrapper(here / "venv" / "bin" / "python")
-    wrapper(here / "plain.txt", executable=False)
+    wrapper(here / "plain.txt").chmod(0o644)
     with pytest.raises(BadInput, match=f"^--sim-python=x: {message}"):
         interpreter_path(text, "--sim-python=x", here)
 
@@ -117,22 +109,3 @@ def test_no_specification(text: str, message: str) -> None:
 )  # fmt: skip
 def test_specifications(text: str) -> None:
     assert checked_specification(text, "") == text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--sim-python=nosuch=sh"], "unknown simulator 'nosuch'; choose from "),
-        (["--sim-python=mujoco=/x//y,z"], "--sim-python=mujoco=/x//y,z: there is no such file"),
-        (["--sim-spec=mujoco=x"], "--sim-spec=mujoco=x: 'x' is none of execnet's keys"),
-        (["--sim-spec=mujoco=popen", "--sim-python=mujoco=sh"], "mujoco has both --sim-python and"),
-        (["--sim-python=mujoco=sh", "--sim-python=mujoco=sh"], "mujoco is given twice; give it"),
-    ],
-)
-def test_said_before_anything_runs(
-    pytester: pytest.Pytester, arguments: list[str], message: str
-) -> None:
-    with pytest.raises(pytest.UsageError) as raised:
-        select(pytester.parseconfig(*arguments))
-    assert message in str(raised.value)
-    assert "\n" not in str(raised.value)

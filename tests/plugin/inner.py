@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -28,3 +30,47 @@ def no_traceback(result: pytest.RunResult) -> None:
     text = result.stdout.str() + result.stderr.str()
     assert "Traceback (" not in text
     assert "INTERNALERROR" not in text
+
+
+def usage_error(result: pytest.RunResult, *lines: str) -> None:
+    """Complain if a run did not end with exit code 4, these lines and no traceback."""
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(lines)
+    no_traceback(result)
+
+
+def distribution(
+    site: Path, name: str, entries: str | bytes, module: str = "", metadata: bool = True
+) -> Path:
+    """An installed package of another party, with entry points of simulators.
+
+    Args:
+        site: the folder that it lies in.
+        name: of it, and with underscores of its module.
+        entries: lines of the entry points.
+        module: source of its module, if it has one.
+        metadata: whether it has any besides the entry points.
+    """
+    folder = site / f"{name}-1.0.dist-info"
+    folder.mkdir(parents=True)
+    if metadata:
+        (folder / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    text = entries if isinstance(entries, bytes) else entries.encode()
+    (folder / "entry_points.txt").write_bytes(b"[pytest_simbench.simulators]\n" + text + b"\n")
+    if module:
+        (site / f"{name.replace('-', '_')}.py").write_text(module)
+    return site
+
+
+def importable(monkeypatch: pytest.MonkeyPatch, site: Path) -> None:
+    """Have inner runs find what is installed in a folder."""
+    path = [str(site), *filter(None, [os.environ.get("PYTHONPATH")])]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
+
+
+def wrapper(python: Path) -> Path:
+    """An interpreter of another name, which is this one."""
+    python.parent.mkdir(parents=True, exist_ok=True)
+    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
+    python.chmod(0o755)
+    return python

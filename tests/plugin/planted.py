@@ -10,7 +10,7 @@ import json
 import sys
 from pathlib import Path
 
-from tests.plugin.inner import FALLING
+from tests.plugin.inner import FALLING, distribution
 
 ADAPTER = """
 from dataclasses import replace
@@ -46,13 +46,7 @@ def plant(folder: Path, environments: Path) -> Path:
     """
     site, index = folder / "site", folder / "index" / "planted-engine"
     (folder / "test_planted.py").write_text(FALLING)
-    info = site / "planted_adapter-1.0.dist-info"
-    info.mkdir(parents=True)
-    (site / "planted_adapter.py").write_text(ADAPTER)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: planted-adapter\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(
-        "[pytest_simbench.simulators]\nplanted = planted_adapter:Planted\n"
-    )
+    distribution(site, "planted-adapter", "planted = planted_adapter:Planted", ADAPTER)
     index.mkdir(parents=True)
     names = [f"planted_engine-{version}-py3-none-any.whl" for version in RELEASES]
     (index / "index.html").write_text("".join(f'<a href="{n}">{n}</a>\n' for n in names))

@@ -168,23 +168,18 @@ def test_ours_under_another_name(pytester: pytest.Pytester) -> None:
     pytester.runpytest_subprocess("--sim=mujoco", "--reps=2").assert_outcomes(passed=1)
 
 
-def test_marks_of_our_names_on_tests_that_are_not_ours(pytester: pytest.Pytester) -> None:
+def test_an_unrelated_run_sees_nothing_of_us(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest(OWN.format(flags=["--gui"], ini=["reps"]))
     pytester.makepyfile(
         """
         import pytest
         pytestmark = [pytest.mark.reps("x"), pytest.mark.needs(3), pytest.mark.only_sim("nosuch")]
 
-        def test_own():
+        def test_with_marks_of_our_names():
             pass
         """
     )
-    pytester.runpytest_subprocess("--strict-markers").assert_outcomes(passed=1)
-
-
-def test_an_unrelated_run_sees_nothing_of_us(pytester: pytest.Pytester) -> None:
-    pytester.makeconftest(OWN.format(flags=["--gui"], ini=["reps"]))
-    pytester.makepyfile("def test_it():\n    pass\n")
-    result = pytester.runpytest_subprocess("--gui")
+    result = pytester.runpytest_subprocess("--gui", "--strict-markers")
     result.assert_outcomes(passed=1)
     assert "sim" not in result.stdout.str().replace("simbench", "").partition("collected")[2]
     assert not Path(pytester.path, ".simbench").exists()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from fnmatch import fnmatchcase
 from pathlib import Path
 from textwrap import dedent
 from xml.etree import ElementTree
@@ -16,9 +14,6 @@ from xml.etree import ElementTree
 import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
-from pytest_simbench.plugin.compare import prepare
-from pytest_simbench.records.description import TaskDescription
-from pytest_simbench.records.metrics import Metric
 
 TEST = """
     import os
@@ -111,55 +106,6 @@ def test_limits_in_the_ini_file_wait_for_a_baseline_which_alone_fails_nothing(
     assert pytester.runpytest_subprocess(*ARGUMENTS).ret == pytest.ExitCode.OK
     result = pytester.runpytest_subprocess(*ARGUMENTS, "--sim-baseline=base")
     assert result.ret == pytest.ExitCode.TESTS_FAILED
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--sim-compare-fail=x:5%"], "--sim-compare-fail needs a run to compare with: *"),
-        (["--sim-compare-fail=rtf:200%"], "rtf:200% can never be exceeded: rtf cannot fall by *"),
-        (
-            ["--sim-compare-fail=placed:5"],
-            "placed:5 can never be exceeded: placed lies between 0 and 100 %; *placed:5%?",
-        ),
-        (["--sim-compare-fail=landed"], "--sim-compare-fail=landed: write it as placed:5%,*"),
-        (["--sim-compare-fail=landed:-5%"], "landed:-5%: write it as placed:5%,*"),
-        (["--sim-compare-fail="], "--sim-compare-fail='': write it as placed:5%,*"),
-        (["--sim-compare-fail=ram:5%,ram:6%"], "ram has two limits; give it one"),
-        (
-            ["--sim-compare-fail=lended:5%"],
-            "no metric is named 'lended' in the baseline; did you mean 'landed'? valid names: "
-            "*landed, *ram,*",
-        ),
-        (["--sim-compare-fail=landing_x:5%"], "landing_x can be neither better nor worse*"),
-        (["--sim-baseline=nowhere"], "there is no baseline *nowhere; give a run folder, its *"),
-        (["--sim-baseline=text"], "the baseline cannot be read: *text:1: not JSON*"),
-        (["--sim-baseline=empty"], "the baseline *empty holds no repetition; give a run folder*"),
-        (["--sim-baseline=other.json"], "the baseline *other.json holds no repetition of a sim*"),
-        (["--sim-baseline=wrong.json"], "the baseline *'benchmarks' is not a list"),
-    ],
-    ids=lambda value: value[0] if isinstance(value, list) else "",
-)
-def test_bad_input_is_one_sentence(
-    pytester: pytest.Pytester, request: pytest.FixtureRequest, arguments: list[str], message: str
-) -> None:
-    records = Path(request.config.rootpath, "tests/measure/stacking_records.jsonl")
-    good = pytester.mkdir("good")
-    first_line = records.read_text().splitlines()[0]
-    good.joinpath("records.jsonl").write_text(first_line + "\n")
-    metrics = [Metric("landed", "landed", better="lower"), Metric("landing_x", "x", better=None),
-               Metric("placed", "placed", kind="share", of=15)]  # fmt: skip
-    said = TaskDescription("stacking", tuple(metrics)).to_dict()
-    good.joinpath("tasks.jsonl").write_text(json.dumps(said) + "\n")
-    pytester.path.joinpath("text").write_text("no record\n")
-    pytester.path.joinpath("empty").write_text("")
-    pytester.path.joinpath("other.json").write_text('{"benchmarks": [{"fullname": "t"}]}')
-    pytester.path.joinpath("wrong.json").write_text('{"benchmarks": 3}')
-    first = [] if "baseline" in arguments[0] or "needs" in message else ["--sim-baseline=good"]
-    with pytest.raises(pytest.UsageError) as raised:
-        prepare(pytester.parseconfig("--sim=mujoco", *first, *arguments), [])
-    assert fnmatchcase(str(raised.value), f"*{message}")
-    assert "\n" not in str(raised.value)
 
 
 def test_a_limit_of_another_package_s_share_that_nothing_can_exceed_fails_the_run(

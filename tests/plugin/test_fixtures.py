@@ -30,29 +30,6 @@ def test_simulator_is_safe_under_hypothesis(pytester: pytest.Pytester) -> None:
     result.assert_outcomes(passed=3)
 
 
-def test_a_crash_is_a_failing_example_and_the_next_gets_a_worker(
-    pytester: pytest.Pytester,
-) -> None:
-    pytester.makepyfile(
-        """
-        import os, signal
-        import pytest
-        from pytest_simbench.client.errors import WorkerExited
-        from pytest_simbench.scene import Scene
-
-        def test_crash(simulator):
-            with pytest.raises(WorkerExited, match="SIGSEGV(.|\\n)*Segmentation fault"):
-                with simulator.episode(Scene("s")) as world:
-                    os.kill(world.process.pid, signal.SIGSEGV)
-                    world.wait(1.0)
-            with simulator.episode(Scene("s")) as world:
-                world.wait(0.1)
-                assert world.time > 0.09
-        """
-    )
-    pytester.runpytest_subprocess("--sim=mujoco").assert_outcomes(passed=1)
-
-
 def test_settings_and_resources(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         """

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-
 import pytest
 
 from pytest_simbench.cli import main
 from pytest_simbench.plugin import old_options
 from pytest_simbench.report.markdown.capabilities import capability_markdown
 from pytest_simbench.simulator.registry import adapter, registered
-from tests.plugin.inner import FALLING
+from tests.cli.command import simbench
+from tests.plugin.inner import FALLING, distribution, importable, usage_error
 
 
 def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str) -> list[str]:
@@ -53,16 +52,14 @@ def test_an_old_option_is_a_command(
 
 def test_an_old_option_that_cannot_be(pytester: pytest.Pytester) -> None:
     result = pytester.runpytest_subprocess("--sim-merge", "none")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(
-        ["--sim-merge will go with the next release; write: simbench merge none",
-         "simbench merge: none: cannot read records from *"]
-    )  # fmt: skip
+    usage_error(
+        result,
+        "--sim-merge will go with the next release; write: simbench merge none",
+        "simbench merge: none: cannot read records from *",
+    )
 
 
-def test_an_untested_version_runs_and_is_named(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        newer="""
+ADAPTERS = """
 from dataclasses import replace
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
@@ -72,25 +69,18 @@ class Newer(MuJoCo):
 class Unlisted(MuJoCo):  # as an engine of the system, which is no Python package
     info = replace(MuJoCo.info, name="unlisted", distribution="no-such-package")
 """
-    )
-    package = pytester.mkdir("newer-1.0.dist-info")
-    (package / "METADATA").write_text("Metadata-Version: 2.1\nName: newer\nVersion: 1.0\n")
-    (package / "entry_points.txt").write_text(
-        "[pytest_simbench.simulators]\nnewer = newer:Newer\nunlisted = newer:Unlisted\n"
-    )
+
+
+def test_an_untested_version_runs_and_is_named(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entries = "newer = newer:Newer\nunlisted = newer:Unlisted"
+    importable(monkeypatch, distribution(pytester.path / "site", "newer", entries, ADAPTERS))
     pytester.makepyfile(test_it=FALLING)
-    result = pytester.run(
-        sys.executable, "-c",
-        "import sys, pytest; sys.path.insert(0, '.'); "
-        "sys.exit(pytest.main(['--sim=newer', '--reps=1', '--sim-output=out']))",
-    )  # fmt: skip
+    result = pytester.runpytest_subprocess("--sim=newer", "--reps=1", "--sim-output=out")
     assert result.ret == 0
     result.stdout.fnmatch_lines(["*UNTESTED VERSION: mujoco * is here, the*"])
-    result = pytester.run(
-        sys.executable, "-c",
-        "import sys; sys.path.insert(0, '.'); from pytest_simbench.cli.main import main; "
-        "main(['list', '-v'])",
-    )  # fmt: skip
+    result = simbench(pytester, "list", "-v")
     result.stdout.fnmatch_lines(
         ["newer: *", "*UNTESTED*", "unlisted: *", "    version not known before it runs, installed"]
     )

@@ -1,4 +1,4 @@
-"""The suite of laws as users run it."""
+"""The suite of laws as users run it, over time steps too (`--sim-sweep`)."""
 
 from __future__ import annotations
 
@@ -40,3 +40,61 @@ def test_a_broken_law_is_a_finding_and_no_failure_unless_asked_for(
     again = simbench(pytester, "report", "out")
     assert again.ret == 0
     again.stdout.fnmatch_lines(["for joints: mujoco, which keeps 1 of 1 laws."])
+
+
+def ids(folder: Path) -> list[str]:
+    return [record["test"].partition("::")[2] for record in records(folder)]
+
+
+def test_a_sweep_of_two_profiles_is_one_run_that_is_resumed_and_reported(
+    pytester: pytest.Pytester,
+) -> None:
+    """What cannot be done at a longer step is a finding, and no failed test."""
+    pytester.makepyfile(
+        test_physics=SUITE.read_text("utf-8"),
+        test_else="""
+        from pytest_simbench.laws import LAWS
+
+        class Refused(type(LAWS[0])):
+            name = "refused"
+
+            def measure(self, world):
+                found = super().measure(world)
+                if found.tolerance > 0.1:
+                    raise ValueError("no such step for me")
+                return found
+
+        def test_refused(repeat, sim_swept):
+            result = repeat(Refused())
+            assert len(result.failures) == (sim_swept and result.records[0].metrics == {})
+        """,
+    )
+    asked = ["--sim=mujoco", "-k", "free_fall or refused", "--reps=1", "--sim-output=out"]
+    asked.append("--sim-profile=default,tuned")
+    pytester.runpytest_subprocess(*asked).assert_outcomes(passed=4)
+    out = pytester.path / "out"
+    assert set(ids(out)) == {
+        "test_law[mujoco-headless-default-free_fall]", "test_law[mujoco-headless-free_fall]",
+        "test_refused[mujoco-headless-default]", "test_refused[mujoco-headless]",
+    }  # fmt: skip
+
+    asked += ["--sim-resume=out", "--sim-sweep=0.016,0.002,1e-3"]
+    result = pytester.runpytest_subprocess(*asked)
+    result.assert_outcomes(passed=2 * 2 * 3)
+    result.stdout.fnmatch_lines(
+        [
+            "mujoco (default) *2/2 *",
+            "mujoco (tuned) *2/2 *",
+            "*the same laws over time steps*",
+            "mujoco (default) *2/2 [12]*ms *",  # whichever cost less this time
+            "mujoco (tuned) *2/2 [12]*ms *",
+            "mujoco (*) fails refused at 16ms: *no such step for me*",
+        ]
+    )
+    assert len(ids(out)) == len(set(ids(out))) == 2 * 2 * 3
+    assert "test_law[mujoco-headless-default-dt=1ms-free_fall]" in ids(out)
+    text = (out / "report.md").read_text()
+    assert "free\\_fall | 1.00 [" in text
+    assert "no such step for me" in text
+    again = simbench(pytester, "report", "out")
+    again.stdout.fnmatch_lines(["the same laws over time steps", "mujoco (tuned) *2/2 [12]*ms *"])

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.plugin.inner import usage_error
+
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "pytest9.md"
 
 typed = pytest.mark.skipif(pytest.version_tuple < (9, 0), reason="pytest 9 has them")
@@ -50,9 +52,7 @@ def test_the_settings_of_the_page_with_strict(pytester: pytest.Pytester, name: s
 def test_another_type_is_one_sentence(pytester: pytest.Pytester, name: str, value: str) -> None:
     Path("pytest.toml").write_text(settings(**{name: value}))
     result = pytester.runpytest_subprocess()
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"ERROR: the ini option {name}: * expects a *"])
-    assert "Traceback" not in result.stderr.str() + result.stdout.str()
+    usage_error(result, f"ERROR: the ini option {name}: * expects a *")
 
 
 @typed
@@ -66,8 +66,7 @@ def test_strict_knows_the_marks_the_options_and_the_ids(pytester: pytest.Pyteste
     )
     Path("pytest.toml").write_text(settings().replace("sim_reps", "sim_repz"))
     result = pytester.runpytest_subprocess("--collect-only", "-q")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["*Unknown config option: sim_repz*"])
+    usage_error(result, "*Unknown config option: sim_repz*")
 
 
 def test_last_failed_runs_a_test_on_the_simulators_on_which_it_failed(

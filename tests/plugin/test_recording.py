@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
-from pytest_simbench.plugin import recording
 from pytest_simbench.recordings.trace import Trace
 from tests.cli.command import simbench
 
@@ -81,31 +79,6 @@ def test_a_run_without_traces_says_so(pytester: pytest.Pytester) -> None:
     pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=o", "--sim-trace=off")
     result = simbench(pytester, "report", "o", "--record=mcap")
     result.stdout.fnmatch_lines(["no recordings: the run has no traces; see --sim-trace"])
-
-
-def test_a_recording_without_traces_is_refused(pytester: pytest.Pytester) -> None:
-    config = pytester.parseconfig("--sim-record=mcap", "--sim-trace=off")
-    with pytest.raises(pytest.UsageError, match="leave --sim-trace=off out$"):
-        recording.check(config)
-
-
-@pytest.mark.parametrize(
-    ("package", "option", "extra"),
-    [("rosbags", "--sim-record=mcap", "ros"), ("av", "--sim-video=first", "video")],
-)
-def test_a_missing_package_is_one_sentence_before_anything_runs(
-    pytester: pytest.Pytester,
-    monkeypatch: pytest.MonkeyPatch,
-    package: str,
-    option: str,
-    extra: str,
-) -> None:
-    config, find = pytester.parseconfig(option), importlib.util.find_spec
-    for place in ("pytest_simbench.recordings.film.find_spec", "importlib.util.find_spec"):
-        monkeypatch.setattr(place, lambda name: None if name == package else find(name))
-    message = rf"^{option}: .*pip install 'pytest-simbench\[{extra}\]'$"
-    with pytest.raises(pytest.UsageError, match=message):
-        recording.check(config)
 
 
 def test_pictures_and_videos_are_taken_beside_what_is_measured(pytester: pytest.Pytester) -> None:

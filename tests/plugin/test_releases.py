@@ -4,12 +4,11 @@ stopped by the gate."""
 from __future__ import annotations
 
 import json
-import os
 
 import pytest
 
 from tests.cli.command import simbench
-from tests.plugin.inner import records
+from tests.plugin.inner import importable, records, usage_error
 from tests.plugin.planted import plant
 
 
@@ -20,8 +19,7 @@ def planted(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(environments))
     monkeypatch.setenv("PIP_INDEX_URL", index.as_uri())
     monkeypatch.setenv("PIP_EXTRA_INDEX_URL", (pytester.path / "none").as_uri())
-    path = [str(pytester.path / "site"), *filter(None, [os.environ.get("PYTHONPATH")])]
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(path))
+    importable(monkeypatch, pytester.path / "site")
 
 
 @pytest.mark.usefixtures("planted")
@@ -91,6 +89,4 @@ def test_wrong_input_is_one_sentence(
     pytester: pytest.Pytester, arguments: list[str], message: str
 ) -> None:
     result = pytester.runpytest_subprocess(*arguments)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines([f"ERROR: *{message}"])
-    assert "Traceback" not in result.stdout.str() + result.stderr.str()
+    usage_error(result, f"ERROR: *{message}")

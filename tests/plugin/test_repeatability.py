@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 
 import pytest
 
 from tests.cli.command import simbench
+from tests.plugin.inner import distribution, importable
 
 TEST = """
     from pytest_simbench.tasks import Moment
@@ -30,7 +30,7 @@ TEST = """
 
 
 @pytest.fixture(autouse=True)
-def importable(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def tasks_here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """The inner pytest can import these tests' tasks, and finds no display."""
     monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))
 
@@ -59,26 +59,24 @@ def test_results_tables_and_files(pytester: pytest.Pytester, workers: tuple[str,
     assert "# Repeatability" in (out / "repeatability.md").read_text()
 
 
-def test_a_broken_claim_fails_the_test(pytester: pytest.Pytester) -> None:
-    site = pytester.mkdir("site")
-    info = site / "noisy_simbench-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: noisy-simbench\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(
-        "[pytest_simbench.simulators]\nnoisy = noisy_simbench:Noisy\n"
-    )
-    (site / "noisy_simbench.py").write_text(
-        "from dataclasses import replace\n"
-        "from tests.repeatability import wrong\n\n"
-        "class Noisy(wrong.Noisy):\n"
-        "    info = replace(wrong.Noisy.info, name='noisy')\n"
-    )
+NOISY = """
+from dataclasses import replace
+from tests.repeatability import wrong
+
+class Noisy(wrong.Noisy):
+    info = replace(wrong.Noisy.info, name="noisy")
+"""
+
+
+def test_a_broken_claim_fails_the_test(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = "noisy = noisy_simbench:Noisy"
+    importable(monkeypatch, distribution(pytester.path / "site", "noisy-simbench", entry, NOISY))
     pytester.makepyfile(TEST)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", os.pathsep.join([str(site), os.environ["PYTHONPATH"]]))
-        result = pytester.runpytest_subprocess(
-            "--sim=noisy", "--protocol=smoke", "--sim-output=out", "-k", "again"
-        )
+    result = pytester.runpytest_subprocess(
+        "--sim=noisy", "--protocol=smoke", "--sim-output=out", "-k", "again"
+    )
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(
         [

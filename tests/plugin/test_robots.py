@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from fnmatch import fnmatchcase
-
 import pytest
 
-from pytest_simbench.plugin.selection import select
 from tests.motion.small_arm import TOML, small_arm
 from tests.plugin.inner import records
 
@@ -173,21 +170,3 @@ def test_every_robot(pytester: pytest.Pytester) -> None:
         assert f"test_fixture[{name}]" in text
     assert "--robot=all: robot 'so101' has too few joints" in text
     assert "--robot=all: the task 'leaning towers' has no robot, and ran once" in text
-
-
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
-        ("ur7", "*--robot=ur7: unknown robot 'ur7'; choose from panda, so101, ur10, ur5, xarm7*"),
-        ("", "*robot='': give a name (simbench robots), a robot file, or all"),
-        ("none.toml", "*--robot=none.toml: cannot read the robot file none.toml: No such file*"),
-        ("bad.toml", "*--robot=bad.toml: bad.toml, [[]arm[]]: stiffness: -1 is no number of at*"),
-    ],
-)
-def test_a_robot_that_is_none(pytester: pytest.Pytester, value: str, message: str) -> None:
-    path = small_arm(pytester.path, TOML.replace("2000.0", "-1"))
-    path.rename(pytester.path / "bad.toml")
-    for arguments in ([f"--robot={value}"], ["-o", f"robot={value}"]):
-        with pytest.raises(pytest.UsageError) as raised:
-            select(pytester.parseconfig(*arguments))
-        assert fnmatchcase(str(raised.value), message)

@@ -8,14 +8,12 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
-from fnmatch import fnmatchcase
 from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
 
 import pytest
 
-from pytest_simbench.plugin.run import Run
 from tests.cli.command import simbench
 
 TEST = """
@@ -165,22 +163,3 @@ def test_another_version_is_not_resumed(pytester: pytest.Pytester, folder: Path)
     result.stdout.fnmatch_lines(['test_one*would not be comparable: versions.mujoco was "0.*'])
     result.stdout.fnmatch_lines(['test_two*would not be comparable: versions.mujoco was "0.*'])
     assert len(path.read_text().splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--sim-resume"], "there is no run to resume in *.simbench; write --sim-resume=RUN *"),
-        (["--sim-resume=none"], "there is no run to resume in *none (it has no records.jsonl); *"),
-        (["--sim-resume=a", "--sim-output=b"], "--sim-resume a and --sim-output b: *"),
-        (["--sim-resume=bad"], "--sim-resume: *bad/records.jsonl:1: not JSON*"),
-    ],
-    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_bad_input_is_one_sentence(
-    pytester: pytest.Pytester, arguments: list[str], message: str
-) -> None:
-    pytester.mkdir("bad").joinpath("records.jsonl").write_text("no record\n")
-    with pytest.raises(pytest.UsageError) as raised:
-        Run(pytester.parseconfig(*arguments))
-    assert fnmatchcase(str(raised.value), message)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
 from pytest_simbench.laws import LAWS
 from tests.cli.command import simbench
-from tests.plugin.inner import records
+from tests.plugin.inner import distribution, importable, records
 
 ADAPTER = '''
 """A third party's simulator: MuJoCo with a coarser step, under its own name."""
@@ -32,17 +31,10 @@ class Elsewhere(MuJoCo):
 def test_third_party_simulator_runs_all_suites(
     pytester: pytest.Pytester, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    site = pytester.mkdir("site")
-    (site / "elsewhere_simbench.py").write_text(ADAPTER)
-    info = site / "elsewhere_simbench-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(
-        "Metadata-Version: 2.1\nName: elsewhere-simbench\nVersion: 1.0\n"
+    entry = "elsewhere = elsewhere_simbench:Elsewhere"
+    importable(
+        monkeypatch, distribution(pytester.path / "site", "elsewhere-simbench", entry, ADAPTER)
     )
-    (info / "entry_points.txt").write_text(
-        "[pytest_simbench.simulators]\nelsewhere = elsewhere_simbench:Elsewhere\n"
-    )
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), os.environ["PYTHONPATH"]]))
     suites = Path(request.config.rootpath, "suites")
     output = pytester.path / "out"
     monkeypatch.delenv("SIMBENCH_DATA", raising=False)

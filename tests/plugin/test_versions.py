@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,15 +10,7 @@ import pytest
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.plugin.selection import select
 from pytest_simbench.simulator.registry import adapter
-from tests.plugin.inner import records
-
-
-def wrapper(python: Path) -> Path:
-    """An interpreter of another name, which is this one."""
-    python.parent.mkdir(parents=True, exist_ok=True)
-    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
-    python.chmod(0o755)
-    return python
+from tests.plugin.inner import records, wrapper
 
 
 @pytest.fixture
@@ -67,32 +58,6 @@ def test_versions_side_by_side(pytester: pytest.Pytester, release: str) -> None:
     assert tests == {f"test_falling[{name}-headless]" for name, _, _ in found}
     steps = {"mujoco": 0.001, release: 0.004, "mujoco@mine": 0.001}
     assert found == {(name, step, seed) for name, step in steps.items() for seed in (10001, 10002)}
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--sim=mujoco==abc d"], "'abc d' is no version; write mujoco==3.3.7"),
-        (["--sim=nosuch==1.0"], "unknown simulator 'nosuch==1.0'; choose from "),
-        (["--sim=mujoco==3.3.7"], "not there yet: simbench install mujoco==3.3.7"),
-        (["--sim=mujoco@"], "give a path"),
-        (["--sim=mujoco@./nowhere"], "there is no such file"),
-        (["--sim=mujoco@a b=python"], "a label has letters"),
-        (["--sim=mujoco==3.3.7@python"], "a build has no release; write mujoco@PYTHON"),
-        (["--sim=mujoco@/bin/sh"], "/bin/sh does not run, or is no Python"),
-        (["--sim=mujoco@a=a/python,mujoco@a=b/python"], "another build is called mujoco@a too"),
-        (["--sim=nosuch@a=a/python"], "unknown simulator 'nosuch'"),
-    ],
-)
-def test_wrong_names_are_one_sentence(
-    pytester: pytest.Pytester, release: str, arguments: list[str], message: str
-) -> None:
-    wrapper(pytester.path / "a" / "python")
-    wrapper(pytester.path / "b" / "python")
-    with pytest.raises(pytest.UsageError) as raised:
-        select(pytester.parseconfig(*arguments))
-    assert message in str(raised.value)
-    assert "\n" not in str(raised.value)
 
 
 def test_a_build_without_a_label_is_called_by_its_version(

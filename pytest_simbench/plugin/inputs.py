@@ -1,4 +1,5 @@
-"""`--sim-scene` and the fixture `scene_file`: users' scenes."""
+"""What tests read of the user's: scenes (`--sim-scene`, `scene_file`) and measured data sets
+(`--sim-data`, `data_set`)."""
 
 from __future__ import annotations
 
@@ -6,11 +7,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from pytest_simbench.cli.values import refusing
+from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import options
+from pytest_simbench.plugin.arguments import failing
 
 if TYPE_CHECKING:
     from pytest_simbench.scene import Scene
@@ -33,23 +37,42 @@ def run_suite(config: pytest.Config) -> None:
 
 
 def check(config: pytest.Config) -> None:
-    """Complain of the file of `--sim-scene` before anything runs.
+    """Complain of a scene that cannot be read, and of a folder of data sets that somebody named and
+    that is not there: else its tests are skipped.
 
     Raises:
-        pytest.UsageError: it cannot be read; one sentence.
+        pytest.UsageError: one sentence.
     """
-    if not options.given(config, "sim_scene"):
-        return
-    from pytest_simbench.experiment.scene_file import read_scene_file
-    from pytest_simbench.simulator import SimulatorError
+    if options.given(config, "sim_data") and not (given := _data_folder(config)).is_dir():
+        raise pytest.UsageError(
+            f"--sim-data: {for_terminal(str(given))} is no folder; name the one that holds the "
+            "data sets, or bring them there with simbench download NAME --data DIR"
+        )
+    if options.given(config, "sim_scene"):
+        from pytest_simbench.experiment.scene_file import read_scene_file
+        from pytest_simbench.simulator import SimulatorError
 
-    try:
-        read_scene_file(options.value(config, "sim_scene"))
-    except SimulatorError as error:
-        raise pytest.UsageError(f"--sim-scene: {error}") from None
+        with options.refusing(SimulatorError, "--sim-scene"):
+            read_scene_file(options.value(config, "sim_scene"))
 
 
-def load(
+def _data_folder(config: pytest.Config) -> Path:
+    """Where data sets are looked for and brought to."""
+    from pytest_simbench.data.sets import default_folder
+
+    given = options.value(config, "sim_data")
+    return Path(given) if given else default_folder()
+
+
+def read_or_skip(config: pytest.Config, name: str) -> Any:
+    """A data set; without it the test is skipped, with a broken one or a wrong name it fails."""
+    from pytest_simbench.data import DataError, DataMissing, read
+
+    with failing(DataError), refusing(DataMissing, kind=pytest.skip.Exception):
+        return read(name, _data_folder(config))
+
+
+def load_scene(
     request: pytest.FixtureRequest,
     folder: Path,
     tell: Callable[[str], None],

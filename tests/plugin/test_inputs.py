@@ -1,4 +1,4 @@
-"""`--sim-scene` and the fixture `scene_file`: what a user types, sees, and gets wrong."""
+"""What tests read of the user's: `--sim-data`, `--sim-scene` and their fixtures."""
 
 from __future__ import annotations
 
@@ -7,7 +7,51 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pytest_simbench.data import tosses
+from tests.data.samples import falling
 from tests.plugin.inner import records
+
+TOSSING = """
+from pytest_simbench.tasks import Tossing
+
+def test_tossing(repeat, data_set):
+    repeat(Tossing(data_set("{name}")))
+"""
+
+
+def test_a_set_is_read_from_the_folder_and_each_toss_is_a_repetition(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SIMBENCH_DATA", raising=False)
+    pytester.makepyfile(TOSSING.format(name="cube_tosses"))
+    folder = pytester.mkdir("here")
+    path = folder / "contactnets_cube_tosses_3.npz"
+    tosses.write(path, [1, 2, 3], [falling(5), falling(6), falling(7)])
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-data=here")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["tossing: 2 repetitions, protocol fast"])
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "outcome", "sentence"),
+    [
+        (None, "cube_tosses", "skipped", "*is not in *: simbench download cube_tosses*"),
+        (b"x", "cube_tosses", "failed", "*contactnets_cube_tosses_1.npz holds no arrays*"),
+        (None, "nosuch", "failed", "*no data set 'nosuch'; choose from cube_tosses*"),
+    ],
+)
+def test_what_is_not_there_or_broken_is_one_sentence(
+    pytester: pytest.Pytester, content: bytes | None, name: str, outcome: str, sentence: str
+) -> None:
+    pytester.makepyfile(TOSSING.format(name=name))
+    folder = Path(pytester.mkdir("here"))
+    if content is not None:
+        (folder / "contactnets_cube_tosses_1.npz").write_bytes(content)
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-data=here", "-rsf")
+    result.assert_outcomes(**{outcome: 1})
+    result.stdout.fnmatch_lines([sentence])
+    assert "Traceback" not in result.stdout.str()
+
 
 SCENE = """
 <mujoco model="blocks">
@@ -108,28 +152,6 @@ def test_keyframes_that_are_not_there_end_the_run(pytester: pytest.Pytester, blo
     found = pytester.runpytest_subprocess("--sim", "mujoco")
     assert found.ret == pytest.ExitCode.USAGE_ERROR
     assert f"{blocks} has no keyframes; name a file of starts, or none" in found.stdout.str()
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "message"),
-    [
-        ("none.xml", None, "No such file"),
-        ("scene.sdf", "<sdf/>", "not read yet"),
-        ("scene.txt", "x", "no engine here reads .txt files"),
-        ("scene.xml", "<mujoco><worldbody></mujoco>", "line 1"),
-        ("scene.xml", '<!DOCTYPE a [<!ENTITY b "c">]><mujoco/>', "document type"),
-    ],
-)
-def test_a_bad_file_is_one_sentence_before_anything_runs(
-    pytester: pytest.Pytester, name: str, text: str | None, message: str
-) -> None:
-    if text is not None:
-        (pytester.path / name).write_text(text)
-    found = pytester.runpytest("--sim-scene", name, "--sim", "mujoco")
-    assert found.ret == pytest.ExitCode.USAGE_ERROR
-    (line,) = [line for line in found.stderr.lines if line.startswith("ERROR:")]
-    assert name in line
-    assert message in line
 
 
 @pytest.mark.engine

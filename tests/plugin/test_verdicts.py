@@ -1,0 +1,156 @@
+"""How often a task is repeated, and what fails a test: crashes, claims that are not decided."""
+
+from __future__ import annotations
+
+import json
+import re
+from xml.etree import ElementTree
+
+import pytest
+
+from tests.plugin.inner import no_traceback, records
+
+DYING = """
+    import os
+    import signal
+
+    import pytest
+    from tests.tiny import Falling
+
+
+    class Dying(Falling):
+        def perform(self, world, seed, count):
+            if seed < {last}:
+                os.kill(world.process.pid, signal.SIGKILL)
+            return super().perform(world, seed, count)
+
+
+    def test_silent(repeat):
+        repeat(Dying(duration=0.05))
+
+
+    @pytest.mark.sim_crashes({marked})
+    def test_marked(repeat):
+        repeat(Dying(duration=0.05))
+
+
+    def test_claims(repeat):
+        repeat(Dying(duration=0.05)).assert_crashed_at_most(0.9)
+
+
+    @pytest.mark.xfail_sim("mujoco", reason="it is known to crash")
+    def test_known(repeat):
+        repeat(Dying(duration=0.05))
+"""
+FIRST = 500
+
+
+@pytest.mark.parametrize(
+    ("crashed", "options", "failed", "told"),
+    [
+        (1, [], ["silent"], "*1 of 2 repetitions crashed: 1 x WorkerExited in *seed 500: *"),
+        (1, ["--sim-crashes=0"], ["silent", "marked"], "*None may crash (--sim-crashes)"),
+        (1, ["--sim-crashes=0.5"], [], "test_silent: crashed <= 50 %*UNDECIDED 1 of 2*"),
+        (2, [], ["silent", "marked", "claims"], "*2 of 2 repetitions crashed*No repetition fin*"),
+    ],
+)
+def test_a_test_fails_when_more_repetitions_crashed_than_may(
+    pytester: pytest.Pytester, crashed: int, options: list[str], failed: list[str], told: str
+) -> None:
+    marked = 0.6  # of 1 in 2
+    pytester.makepyfile(DYING.format(last=FIRST + crashed, marked=marked))
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco", "--reps=2", f"--sim-seed={FIRST}", "-rfx", *options
+    )
+    known = int("--sim-crashes=0.5" not in options)
+    result.assert_outcomes(
+        failed=len(failed), passed=3 - len(failed), xfailed=known, xpassed=1 - known,
+        warnings=result.parseoutcomes().get("warnings", 0),
+    )  # fmt: skip
+    result.stdout.fnmatch_lines([told])
+    for name in failed:
+        result.stdout.fnmatch_lines([f"FAILED *::test_{name}[[]mujoco-headless]*"])
+    assert "Traceback" not in result.stdout.str()
+    assert "check_crashes" not in result.stdout.str()  # a line of ours
+
+
+def test_the_ini_file_may_allow_crashes_and_a_mark_is_nearer(pytester: pytest.Pytester) -> None:
+    pytester.makeini("[pytest]\nsim_crashes = 1\n")
+    pytester.makepyfile(DYING.format(last=FIRST + 2, marked=0.9))
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco", "--reps=2", f"--sim-seed={FIRST}", "-k", "silent or marked"
+    )
+    result.assert_outcomes(passed=1, failed=1, deselected=2)
+    result.stdout.fnmatch_lines(["FAILED *::test_marked*"])
+
+
+STRICT = """
+    from tests.tiny import Falling
+
+    def test_falling(repeat, threshold):
+        repeat(Falling({duration})).assert_at_least("landed", threshold("landed", 0.9))
+"""
+TOO_FEW = "*not judged whether at least 90 %, a claim needs 5 repetitions or more*"
+UNDECIDED = "UNDECIDED test_falling: landed >= 90 %: mujoco *"
+
+
+@pytest.mark.parametrize(
+    ("duration", "arguments", "outcome", "message"),
+    [
+        (0.6, ["--reps=1"], "passed", f"{UNDECIDED}(a claim needs*"),
+        # A single repetition failed any claim with one lost cube.
+        (0.05, ["--reps=1"], "passed", f"{UNDECIDED}(a claim needs*"),
+        (0.6, ["--reps=1", "--sim-strict"], "failed", TOO_FEW),
+        (0.6, ["--reps=1", "-o", "sim_strict=true"], "failed", TOO_FEW),
+        (0.6, ["--reps=5"], "passed", f"{UNDECIDED}100 * (about * more"),
+        (0.6, ["--reps=5", "--sim-strict"], "failed", "*inconclusive whether at least 90 %*"),
+        (0.6, ["--reps=5", "--sim-strict", "--sim-threshold=landed=0.3"], "passed", "*PASS*"),
+    ],
+)
+def test_undecided(
+    pytester: pytest.Pytester, duration: float, arguments: list[str], outcome: str, message: str
+) -> None:
+    pytester.makepyfile(STRICT.format(duration=duration))
+    result = pytester.runpytest_subprocess("--sim=mujoco", *arguments)
+    result.assert_outcomes(**{outcome: 1})
+    assert result.ret == (outcome == "failed")
+    result.stdout.fnmatch_lines([message])
+    no_traceback(result)
+
+
+AUTO = """
+    from tests.tiny import Falling
+
+    def test_decided(repeat):
+        repeat(Falling()).assert_at_least("landed", 0.5)
+
+    def test_undecided(repeat):
+        repeat(Falling()).assert_at_least("landed", 0.9)
+
+    def test_without_a_claim(repeat):
+        repeat(Falling())
+"""
+
+
+def test_it_repeats_until_the_claims_are_decided(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(AUTO)
+    result = pytester.runpytest_subprocess(
+        *("--sim=mujoco", "--reps=auto:12", "--sim-output=out", "--sim-jobs=4"),
+        *("--junitxml=junit.xml", "--benchmark-json=b.json"),
+    )
+    result.assert_outcomes(passed=3)
+    kept = records(pytester.path / "out")
+    tests = [record["test"].split("::")[1].split("[")[0] for record in kept]
+    wanted = {"test_decided": 10, "test_undecided": 12, "test_without_a_claim": 10}
+    assert {name: tests.count(name) for name in wanted} == wanted
+    result.stdout.fnmatch_lines(["UNDECIDED test_undecided: *>= 90 %: mujoco *"])
+    told = re.findall(r"repetition (\d+) of (\d+)", result.stdout.str())
+    assert told
+    assert [pair for pair in told if int(pair[0]) > int(pair[1])] == []
+    # What pytest-benchmark and JUnit are told is known when the test has ended only.
+    saved = json.loads((pytester.path / "b.json").read_text())["benchmarks"]
+    assert [b["stats"]["rounds"] for b in saved] == [10, 12, 10]
+    found = ElementTree.parse(pytester.path / "junit.xml").iterfind(
+        ".//property[@name='repetitions']"
+    )
+    assert [item.get("value") for item in found] == ["10", "12", "10"]
