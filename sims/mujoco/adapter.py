@@ -19,7 +19,14 @@ from numpy.typing import NDArray
 from pytest_simbench.description.carried import Carried
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotations
-from pytest_simbench.simulator import Capability, Deviation, Simulator, SimulatorInfo, lazy_import
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    NotSupportedError,
+    Simulator,
+    SimulatorInfo,
+    lazy_import,
+)
 
 from .bounces import BOUNCES
 from .own_file import FileReadBack, OwnFile
@@ -144,6 +151,11 @@ class MuJoCo(Simulator):
         )
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        if self._own_file is not None:
+            raise NotSupportedError(
+                "in the profile `file` the file's own actuators move its joints; choose another "
+                "profile for motions"
+            )
         self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
 
     def push(self, wrenches: FloatArray) -> None:
@@ -173,6 +185,8 @@ class MuJoCo(Simulator):
         return state
 
     def joint_state(self) -> FloatArray:
+        if self._own_file is not None:
+            return self._own_file.joint_state()
         return np.stack([self.data.qpos[self._q], self.data.qvel[self._v]])
 
     def save(self) -> FloatArray:

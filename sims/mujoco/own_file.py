@@ -37,6 +37,9 @@ EXCUSED = {
 }
 """Quantities in which the file may differ from its scene, by those of the account."""
 
+OF_JOINTS = "joint/* link/* gripper/* body/*/touches ground/touches"
+"""Quantities of joints and links, which are not read back of a file."""
+
 
 class OwnFile:
     """The model of a scene's file, with the scene's bodies at their places.
@@ -59,7 +62,8 @@ class OwnFile:
         self.reading = reading = Reading(scene.file)
         names = {body.name for body in scene.bodies}
         fixed = {body.name: body.fixed for body in scene.bodies}
-        if scene.robot or fixed != {body.name: body.fixed for body in reading.scene.bodies}:
+        own = {body.name: body.fixed for body in reading.scene.bodies}
+        if fixed != own or _joints(scene) != _joints(reading.scene):
             raise NotSupportedError(
                 f"scene {scene.name!r} has other bodies than its file {scene.file}, which the "
                 "profile `file` loads; choose another profile"
@@ -77,6 +81,8 @@ class OwnFile:
         joints = self.model.body_jntadr[self.roots]
         self._q = self.model.jnt_qposadr[joints][:, None] + np.arange(7)
         self._v = self.model.jnt_dofadr[joints][:, None] + np.arange(3)
+        joints = np.array([link.joint for link in reading.links], dtype=int)
+        self._joint_q, self._joint_v = self.model.jnt_qposadr[joints], self.model.jnt_dofadr[joints]
         self._centres = np.array([p.frame.position for p in free]).reshape(-1, 3)
         self._turns = [p.frame.quaternion for p in free]
         for k, (body, placed) in enumerate(zip(scene.free_bodies, free, strict=True)):
@@ -94,11 +100,18 @@ class OwnFile:
         steps = self.reading.scene.file_timestep, float(self.model.opt.timestep)
         told = "the file asks for steps of {:g} s, and these are of {:g} s".format(*steps)
         other = [Deviation("", told, only="file")] if steps[0] != steps[1] else []
+        if self.reading.links:
+            other.append(Deviation(OF_JOINTS, "joints, links and drives are the file's own"))
         return *other, *(
             Deviation(EXCUSED[line.quantity], f"as the file has it: {line.reason}", only="file")
             for line in lines
             if line.quantity in EXCUSED
         )
+
+    def joint_state(self) -> FloatArray:
+        """As `Simulator.joint_state`: from the posture in which the file is written."""
+        positions = self.data.qpos[self._joint_q] - self.model.qpos0[self._joint_q]
+        return np.stack([positions, self.data.qvel[self._joint_v]])
 
     def body_state(self) -> FloatArray:
         """As `Simulator.body_state`."""
@@ -118,7 +131,8 @@ class OwnFile:
     def numbers(self) -> Numbers:
         ground = self.reading.ground
         boxes = {name: p.geoms for name, p in self.placed.items()}
-        return Numbers(-1 if ground is None else ground, boxes, {}, {})
+        links = {link.name: link.body for link in self.reading.links if link.whole}
+        return Numbers(-1 if ground is None else ground, boxes, links, {})
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
         """As `Simulator.contact_forces`; about the scene's origin."""
@@ -133,6 +147,7 @@ class FileReadBack(ReadBack):
     def __init__(self, simulator: Any, own: OwnFile) -> None:
         self.own = own
         super().__init__(simulator, own.model, own.data, own.numbers())
+        self.prepared = None  # joints and links are not read back
 
     def world(self) -> dict[str, Any]:
         found = super().world()
@@ -166,3 +181,7 @@ class FileReadBack(ReadBack):
             "com": axes @ centre + part.turn.T @ away,
             "inertia": axes @ tensor @ axes.T,
         }
+
+
+def _joints(scene: Scene) -> tuple[str, ...]:
+    return scene.robot.joint_names if scene.robot is not None else ()

@@ -296,13 +296,18 @@ def contact_forces(model: Any, data: Any, at: Numbers) -> Iterator[tuple[str, st
     for k in range(data.ncon):
         contact = data.contact[k]
         first, second = (
-            names.get(geom) or links[int(model.geom_bodyid[geom])]
+            names.get(geom) or _link_of(links, model, int(model.geom_bodyid[geom]))
             for geom in (int(contact.geom1), int(contact.geom2))
         )
         mujoco.mj_contactForce(model, data, k, local)  # on the second, in the contact's frame
         frame = np.reshape(contact.frame, (3, 3))  # its axes are rows
         force, torque = local[:3] @ frame, local[3:] @ frame
         yield second, first, np.concatenate([force, torque + np.cross(contact.pos, force)])
+
+
+def _link_of(links: Mapping[int, str], model: Any, body: int) -> str:
+    """The link that a body is, or is fixed on; a further plane of a user's file is ground."""
+    return links.get(body) or links.get(int(model.body_weldid[body]), "ground")
 
 
 def joint_wrenches(model: Any, data: Any, at: Numbers) -> FloatArray:

@@ -17,7 +17,10 @@ from pytest_simbench.description.urdf import PreparedRobot  # noqa: E402
 from pytest_simbench.experiment.case import Case  # noqa: E402
 from pytest_simbench.experiment.handle import SimulatorHandle  # noqa: E402
 from pytest_simbench.experiment.scene_file import read_scene_file  # noqa: E402
+from pytest_simbench.parity.compare import compare  # noqa: E402
+from pytest_simbench.parity.quantities import expected_quantities  # noqa: E402
 from pytest_simbench.simulator import DescriptionError  # noqa: E402
+from pytest_simbench.simulator.settings import changed as with_changes  # noqa: E402
 from tests.conftest import ADAPTERS, case_of  # noqa: E402
 
 KITCHEN = """
@@ -156,6 +159,27 @@ def test_nothing_of_a_joint_is_dropped_in_silence(kitchen: Path, old: str, new: 
 def test_what_no_tree_holds_is_refused(kitchen: Path, old: str, new: str, why: str) -> None:
     with pytest.raises(DescriptionError, match=why):
         changed(kitchen, old, new)
+
+
+def test_the_file_itself_moves_as_the_carried_tree(kitchen: Path) -> None:
+    """The profile `file` beside `default`, a tenth of a second long."""
+    scene, found = Reading(str(kitchen)).scene, {}
+    for profile in ("default", "file"):
+        settings = with_changes(MuJoCo.profiles[profile], {"timestep": 1e-4}, "mujoco")
+        simulator = MuJoCo(settings)
+        simulator.load(scene)
+        declared = [d for d in simulator.info.deviations if d.concerns(scene)]
+        expected = expected_quantities(scene, simulator.settings)
+        assert not compare(expected, simulator.read_back(), declared, "mujoco").wrong
+        for _ in range(1000):
+            simulator.step()
+        found[profile] = simulator.joint_state()
+        assert {name for pair in simulator.contact_forces() for name in pair[:2]} <= {
+            "body/ball", "link/drawer",
+        }  # fmt: skip
+        simulator.close()
+    assert np.abs(found["file"][0]).max() > 0.01
+    assert found["file"] == pytest.approx(found["default"], rel=1e-3, abs=1e-4)
 
 
 def test_a_body_on_several_joints_moves_as_in_the_file(kitchen: Path) -> None:
