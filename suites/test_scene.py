@@ -12,6 +12,7 @@ nobody can say whether two ends differ because of an engine (docs/scenes.md).
 import pytest
 
 from pytest_simbench.simulator.registry import settings_of
+from pytest_simbench.simulator.settings import LARGEST_TIMESTEP
 from pytest_simbench.tasks import Settling
 
 MILLIMETRES = (0.01, 0.1, 1.0)
@@ -23,7 +24,7 @@ def sim_settings(request, sim_case, scene_file):
     """The time step of the test: the profile's own (in `file` the file's), or a part of it."""
     own = settings_of(sim_case.simulator, sim_case.profile, {}).timestep
     if sim_case.profile == "file":
-        own = scene_file().file_timestep
+        own = min(scene_file().file_timestep, LARGEST_TIMESTEP)
     return {"timestep": own / request.node.callspec.params.get("finer", 1)}
 
 

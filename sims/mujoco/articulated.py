@@ -61,6 +61,10 @@ PLAIN = '<mujoco><worldbody><body><joint/><geom size="1"/></body></worldbody></m
 BETWEEN = 1e-3
 """Share of a body's mass and inertia that a link between two of its joints has."""
 
+LEAST = 1e-9
+"""Mass [kg] and moments [kg m^2] that such a link has in addition: a marker weighs next to nothing,
+and engines refuse less."""
+
 
 @dataclass(frozen=True)
 class OnJoint:
@@ -188,7 +192,8 @@ class Tree:
         mass, centre, tensor = self.reading.inertial(link.body)
         anchor = self.model.jnt_pos[link.joint]
         if not link.whole:
-            return Link(link.name, BETWEEN * mass, centre - anchor, BETWEEN * tensor)
+            mass, tensor = BETWEEN * mass + LEAST, BETWEEN * tensor + np.diag([LEAST] * 3)
+            return Link(link.name, mass, centre - anchor, tensor)
         frame = self._frame(link).inverse()
         geoms = [(g, frame * self.reading.geom_pose(g)) for g in self._geoms(link)]
         shapes = [self._shape(geom, pose, link) for geom, pose in geoms]

@@ -85,6 +85,9 @@ class OwnFile:
         self._joint_q, self._joint_v = self.model.jnt_qposadr[joints], self.model.jnt_dofadr[joints]
         self._centres = np.array([p.frame.position for p in free]).reshape(-1, 3)
         self._turns = [p.frame.quaternion for p in free]
+        if scene.robot is not None:  # as written, or at the end of a range that begins elsewhere
+            zero = self.model.qpos0[self._joint_q]
+            self.data.qpos[self._joint_q] = zero + scene.robot.column("initial_position")
         for k, (body, placed) in enumerate(zip(scene.free_bodies, free, strict=True)):
             root = body.pose.translated(z=-reading.lift) * placed.frame.inverse()
             self.data.qpos[self._q[k]] = root.as_array()
