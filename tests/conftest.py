@@ -122,7 +122,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """The quick tier draws a fifth of Hypothesis' examples; the whole suite draws all of them."""
     if config.getoption("markexpr") == QUICK:
         settings.load_profile("simbench-quick")
-        os.environ.setdefault("SIMBENCH_FUZZ", "5")  # tests/plugin/test_fuzz.py
+        os.environ.setdefault("SIMBENCH_FUZZ", "5")  # tests/report/test_fuzz.py
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:

@@ -28,6 +28,9 @@ from .world import closed
 
 mujoco = lazy_import("mujoco")
 
+LEAST = 1e-12
+"""Mass [kg] and moments [kg m^2] of a body of a user's file that has none but that of its parts."""
+
 
 @dataclass(frozen=True)
 class Numbers:
@@ -106,8 +109,8 @@ class ReadBack(readback.ReadBack):
             dof = model.body_dofadr[body] + np.arange(6)
             passive = np.ravel(model.dof_damping[dof])[:6]
             found["damping"] += [
-                passive[:3].max() / model.body_mass[body],
-                passive[3:].max() / model.body_inertia[body].max(),
+                passive[:3].max() / max(model.body_mass[body], LEAST),
+                passive[3:].max() / max(model.body_inertia[body].max(), LEAST),
             ]
         return found
 
