@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pytest_simbench.laws.mechanisms import Part, mechanism
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Scene, Wrench
 from pytest_simbench.worker.server import Server
@@ -122,6 +123,14 @@ def test_a_jump_is_told_by_each_step_of_a_log_and_a_small_one_by_no_less() -> No
     pattern = r"let 'cube' jump: it moved by 0\.00\d+ m in the 0\.001 s before t = 0\.25"
     assert re.search(pattern, told(adapter, wait(1.2, 0.0)))
     assert told(adapter) == ""
+
+
+def test_joints_of_a_users_file_may_swing_there_and_back_between_two_looks() -> None:
+    """A short pendulum that hangs free does so in a fifth of a second; a driven arm does not."""
+    bob = Part("bob", (0, 1, 0), centre=(0.007, 0, 0), inertia=(1e-6,) * 3)
+    scene = Scene("limp", robot=mechanism("bob", bob))
+    assert "let 'bob' jump" in told(ADAPTERS["mujoco"], scene=scene)
+    assert told(ADAPTERS["mujoco"], scene=replace(scene, file="bob.xml")) == ""
 
 
 def test_only_who_is_watched_is_told() -> None:
