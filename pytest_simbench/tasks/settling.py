@@ -141,9 +141,12 @@ class Settling(Task):
             rest = world.wait(RESTLESS, log_period=LOG_PERIOD)
         assert rest is not None  # a log was asked for
         ends = {body.name: body.moved_to(world.pose(body.name)) for body in free}
-        before = {body.name: _place(body) for body in free} | _links(world.scene, None)
+        robot = world.scene.robot
+        prepared = None if robot is None else PreparedRobot(robot)
+        start = None if robot is None else robot.column("initial_position")
+        before = {body.name: _place(body) for body in free} | _links(prepared, start)
         after = {name: _place(body) for name, body in ends.items()}
-        after |= _links(world.scene, world.joints[0])
+        after |= _links(prepared, world.joints[0])
         ways = {
             name: float(np.linalg.norm(np.subtract(place.position, before[name].position)))
             for name, place in after.items()
@@ -166,14 +169,13 @@ class Settling(Task):
         return Outcome(metrics, details, reasons=tuple(f"not: {text}" for text in failed))
 
 
-def _links(scene: Scene, positions: FloatArray | None) -> dict[str, Pose]:
+def _links(prepared: PreparedRobot | None, positions: FloatArray | None) -> dict[str, Pose]:
     """The moving links of the scene's robot, each at its centre of mass, at joint positions
-    (n_joints,) [rad or m]; None: at the initial ones."""
-    if scene.robot is None:
+    (n_joints,) [rad or m]; none without a robot."""
+    if prepared is None or positions is None:
         return {}
-    prepared, robot = PreparedRobot(scene.robot), scene.robot
-    joints = robot.column("initial_position") if positions is None else positions
-    poses = link_poses(prepared, dict(zip(robot.joint_names, joints.tolist(), strict=True)))
+    names = prepared.robot.joint_names
+    poses = link_poses(prepared, dict(zip(names, positions.tolist(), strict=True)))
     return {
         link.name: poses[link.name] * Pose.at(*link.centre.tolist())
         for link in prepared.moving_links

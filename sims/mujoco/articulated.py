@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRI
 from pytest_simbench.description.robot_files import digest, keep
 from pytest_simbench.description.stl import written_stl
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape, write_joint, write_link
-from pytest_simbench.scene import FloatArray, Gripper, Joint, Polytope, Pose, Robot, Vector3
+from pytest_simbench.scene import FloatArray, Gripper, Joint, Polytope, Pose, Robot
 from pytest_simbench.scene.polytope import MOST
+from pytest_simbench.scene.pose import vector3
 from pytest_simbench.scene.robot import FARTHEST, FREE, WIDEST
 from pytest_simbench.simulator import lazy_import
 
@@ -35,28 +36,6 @@ STRONG = 1e4
 
 FASTEST = 1000.0
 """Largest speed of a joint, which a file does not limit [rad/s or m/s]."""
-
-ON_LINKS = {
-    "jnt_margin": "joint margin",
-    "jnt_solref": "joint solreflimit, solimplimit",
-    "jnt_solimp": "joint solreflimit, solimplimit",
-    "jnt_actfrcrange": "joint actuatorfrcrange",
-    "jnt_actgravcomp": "joint actuatorgravcomp",
-    "jnt_stiffnesspoly": "joint stiffness (of higher order)",
-    "dof_frictionloss": "joint frictionloss",
-    "dof_solref": "joint solreffriction, solimpfriction",
-    "dof_solimp": "joint solreffriction, solimpfriction",
-    "dof_dampingpoly": "joint damping (of higher order)",
-}
-"""Fields of a hinge that no scene holds, in the words of the file."""
-
-REASONS = {
-    "dof_frictionloss": "drives have no friction: what stays where it is pushed in the file may "
-    "creep, swing or fall here",
-}
-
-PLAIN = '<mujoco><worldbody><body><joint/><geom size="1"/></body></worldbody></mujoco>'
-
 
 BETWEEN = 1e-3
 """Share of a body's mass and inertia that a link between two of its joints has."""
@@ -154,7 +133,7 @@ class Tree:
             above = Pose() if link.above is None else self._frame(link.above)
             origin = above.inverse() * self._frame(link)
             hinge = self.model.jnt_type[link.joint] == mujoco.mjtJoint.mjJNT_HINGE
-            axis = triple(self.model.jnt_axis[link.joint])
+            axis = vector3(self.model.jnt_axis[link.joint])
             kind = "revolute" if hinge else "prismatic"
             on = MOUNT if link.above is None else link.above.name
             moving = MovingJoint(link.told, kind, on, link.name, origin, axis)
@@ -186,7 +165,7 @@ class Tree:
     def _frame(self, link: OnJoint) -> Pose:
         """Of the link, at its joint, in the file's world."""
         body = self.reading.pose(link.body)
-        return body * Pose(triple(self.model.jnt_pos[link.joint]))
+        return body * Pose(vector3(self.model.jnt_pos[link.joint]))
 
     def _link(self, link: OnJoint) -> Link:
         mass, centre, tensor = self.reading.inertial(link.body)
@@ -294,8 +273,8 @@ class Tree:
         tell("joint pos, axis, range, armature", CARRIED, f"{len(names)} hinges and sliders", names)
         dofs = model.jnt_dofadr[[link.joint for link in self.links]]
         if model.dof_damping[dofs].any():
-            reason = "as the damping of the joint's drive"
-            tell("joint damping", CARRIED, reason, names)
+            reason = "as a drive's; an engine whose drives are no springs brakes such a joint"
+            tell("joint damping", APPROXIMATED, reason, names)
         if frictions.min() < frictions.max():
             reason = f"links have one friction: the largest of {sorted(set(frictions.tolist()))}"
             tell("geom friction (sliding)", APPROXIMATED, reason)
@@ -306,23 +285,6 @@ class Tree:
             gap = 1000 * max(self._coarse.values())
             reason = f"round shapes of links are hulls of corners, up to {gap:.2g} mm smaller"
             tell("geom size (round, of links)", APPROXIMATED, reason, self._coarse)
-        plain: Any = mujoco.MjModel.from_xml_string(PLAIN)
-        numbers = {"jnt": [link.joint for link in self.links], "dof": dofs.tolist()}
-        for field, quantity in ON_LINKS.items():
-            usual = getattr(plain, field, None)
-            if usual is None:
-                continue
-            found = np.asarray(getattr(model, field))[numbers[field[:3]]]
-            odd = np.any(np.reshape(found != usual, (len(found), -1)), axis=1)
-            if odd.any():
-                reason = REASONS.get(field, "no drive of a scene has it")
-                where = [name for name, differs in zip(names, odd, strict=True) if differs]
-                tell(quantity, NOT_CARRIED, reason, where)
-
-
-def triple(values: Any) -> Vector3:
-    x, y, z = (float(value) for value in values)
-    return (x, y, z)
 
 
 def directions(count: int) -> FloatArray:

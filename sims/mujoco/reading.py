@@ -1,8 +1,7 @@
 """A file of MuJoCo's own format as a scene, and the account of what was carried of it.
 
 MuJoCo compiles the file; all is read from the compiled model, so defaults, classes, frames and
-includes mean what MuJoCo means. A field of the model that differs from that of a plain ball, and of
-which the tables here know nothing, is told as not carried: later releases may have more of them.
+includes mean what MuJoCo means.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
+from pytest_simbench.description.carried import APPROXIMATED, NOT_CARRIED, Carried, named
 from pytest_simbench.description.urdf import ROOT
 from pytest_simbench.scene import (
     Body,
@@ -32,12 +31,12 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.scene.checks import FORBIDDEN, RESERVED
 from pytest_simbench.scene.polytope import MOST
-from pytest_simbench.scene.pose import quaternion_of
+from pytest_simbench.scene.pose import quaternion_of, vector3
 from pytest_simbench.scene.scene import ROOM, Start
 from pytest_simbench.simulator import DescriptionError, lazy_import
 
-from .articulated import MOUNT, Tree, directions, on_joints, triple
-from .told import DERIVED, OBJECTS, OPTIONS, SOLVER, TOLD
+from .account import tell_the_rest, values_of
+from .articulated import MOUNT, Tree, directions, on_joints
 
 mujoco = lazy_import("mujoco")
 
@@ -46,8 +45,6 @@ CLOSE = 1e-6
 
 CONCAVE = 1.02
 """Volume of a hull over that of its mesh from which the mesh is told to be concave."""
-
-PLAIN = '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>'
 
 
 @dataclass(frozen=True)
@@ -105,10 +102,7 @@ class Reading:
             self._place(placed)
         except SceneError as error:
             raise DescriptionError(f"{path}: {error}") from None
-        self._tell_shapes()
-        self._tell_options()
-        self._tell_fields()
-        self._tell_objects()
+        tell_the_rest(self)
 
     def tell(self, quantity: str, state: str, reason: str, where: Iterable[str] = ()) -> None:
         self.account.append(Carried(quantity, state, reason, named(where)))
@@ -120,6 +114,11 @@ class Reading:
         return getattr(self.model, kind)(number).name or f"{kind} {number}"
 
     # What there is
+
+    def on_joint(self, geom: int) -> bool:
+        """Whether a shape is one of a link."""
+        root = self.root(int(self.model.geom_bodyid[geom]))
+        return any(link.body == root for link in self.links)
 
     def root(self, body: int) -> int:
         """The moving body that a body is a part of; 0: none, it is fixed."""
@@ -195,7 +194,8 @@ class Reading:
             self.tell(
                 "geom friction (sliding)",
                 APPROXIMATED,
-                f"a body has one friction: the largest of {_values(model.geom_friction[geoms, 0])}",
+                "a body has one friction: the largest of "
+                f"{values_of(model.geom_friction[geoms, 0])}",
                 [name],
             )
         shapes = []
@@ -218,7 +218,7 @@ class Reading:
             if even and np.allclose(shapes[0].pose.as_array(), Pose().as_array(), atol=CLOSE):
                 body = shapes[0].changed(name=name, mass=mass)
                 if not np.allclose(np.diag(turned), body.even_inertia(), rtol=CLOSE, atol=0):
-                    body = body.changed(moments=triple(np.diag(turned)))
+                    body = body.changed(moments=vector3(np.diag(turned)))
                 return Placed(self._damped(body, root, centre), root, geoms, shapes[0].pose)
         moments, axes = np.linalg.eigh(tensor)
         axes[:, 0] *= np.sign(np.linalg.det(axes))
@@ -230,7 +230,7 @@ class Reading:
             Pose(),
             mass=mass,
             friction=friction,
-            moments=triple(moments),
+            moments=vector3(moments),
             file_frame=inverse,
         )
         return Placed(self._damped(body, root, centre), root, geoms, frame)
@@ -358,9 +358,9 @@ class Reading:
             Path(self.path).stem.strip(" .") or "scene",
             tuple(p.body for p in self.placed),
             tree.robot(self.lift) if self.links else None,
-            gravity=(0.0, 0.0, 0.0) if off else triple(model.opt.gravity),
+            gravity=(0.0, 0.0, 0.0) if off else vector3(model.opt.gravity),
             ground_friction=friction,
-            room=triple(room),
+            room=vector3(room),
             file=self.path,
             starts=tuple(self._start(key) for key in model.key_qpos),
             file_timestep=float(model.opt.timestep),
@@ -377,89 +377,6 @@ class Reading:
             for name, k in zip(free, joints, strict=True)
         )
 
-    # The account
-
-    def _tell_shapes(self) -> None:
-        model = self.model
-        self.tell("body mass, inertia, pos, quat", CARRIED, "as compiled, in full digits")
-        self.tell("geom type, size, pos, quat", CARRIED, f"{len(self.solid)} shapes that collide")
-        self.tell("option gravity", CARRIED, f"{_values(np.array([self.scene.gravity]))} m/s^2")
-        self.tell(
-            "geom friction (sliding)",
-            CARRIED,
-            f"{_values(np.array(sorted(self.scene.frictions)))}; of two surfaces the larger counts",
-        )
-        masks = np.stack([model.geom_contype, model.geom_conaffinity], axis=1)
-        if seen := np.flatnonzero(~masks.any(axis=1)).tolist():
-            names = (self.name("geom", geom) for geom in seen)
-            self.tell("geom (visual)", NOT_CARRIED, "it cannot collide; its mass counts", names)
-        moving = masks[[g for p in self.placed if p.root for g in p.geoms]]
-        masks = masks[[g for g in [*self.solid, self.ground] if g is not None]]
-        meet = (moving[:, None] & masks[:, ::-1]).any(axis=2)
-        if not meet.all():
-            self.tell(
-                "geom contype, conaffinity",
-                NOT_CARRIED,
-                "some pairs do not collide in the file; here all bodies collide with each other: "
-                f"{_values(masks)}",
-            )
-
-    def _tell_options(self) -> None:
-        option, plain = self.model.opt, mujoco.MjModel.from_xml_string(PLAIN).opt
-        told = {name: _values(np.array([getattr(option, name)])) for name in SOLVER}
-        self.tell(
-            "option " + ", ".join(SOLVER),
-            NOT_CARRIED,
-            "each engine has the options of its profile; in the file: "
-            + ", ".join(f"{name} {value}" for name, value in told.items()),
-        )
-        for name in dir(plain):
-            if name.startswith("_") or name in (*SOLVER, "gravity"):
-                continue
-            value = np.array([getattr(option, name)])
-            if not np.array_equal(value, [getattr(plain, name)]):
-                reason = OPTIONS.get(name, "each engine has the options of its profile")
-                self.tell(f"option {name}", NOT_CARRIED, f"{reason}; in the file: {_values(value)}")
-
-    def _tell_fields(self) -> None:
-        """What a plain ball on a free joint has not."""
-        model, plain = self.model, mujoco.MjModel.from_xml_string(PLAIN)
-        roots = [p.root for p in self.placed if p.root]
-        geoms = self.solid if self.ground is None else [*self.solid, self.ground]
-        joints = [int(model.body_jntadr[root]) for root in roots]
-        dofs = [int(model.body_dofadr[root]) + k for root in roots for k in range(6)]
-        rows = {"geom": geoms, "body": [*range(1, model.nbody)], "jnt": joints, "dof": dofs}
-        for kind, numbers in rows.items():
-            for field in dir(plain) if numbers else ():
-                if not field.startswith(f"{kind}_") or field in DERIVED:
-                    continue
-                found = np.asarray(getattr(model, field))[numbers]
-                usual = np.asarray(getattr(plain, field))[-1]
-                if field == "geom_friction":
-                    found, usual = found[:, 1:], usual[1:]
-                quantity, reason, always = TOLD.get(
-                    field, (field.replace("_", " ", 1), "no scene holds it", False)
-                )
-                odd = np.any(np.reshape(found != usual, (len(found), -1)), axis=1)
-                if odd.any() or always:
-                    own = [n for n, differs in zip(numbers, odd, strict=True) if differs]
-                    names = self._owners(kind, own)
-                    self.tell(quantity, NOT_CARRIED, f"{reason}; {_values(found)}", names)
-
-    def _owners(self, kind: str, numbers: list[int]) -> list[str]:
-        if kind == "dof":
-            numbers = sorted({int(self.model.dof_jntid[number]) for number in numbers})
-        return [self.name("joint" if kind in ("dof", "jnt") else kind, n) for n in numbers]
-
-    def _tell_objects(self) -> None:
-        for count, (kind, reason) in OBJECTS.items():
-            carried = self.servos if kind == "actuator" else set()
-            left = [k for k in range(int(getattr(self.model, count, 0))) if k not in carried]
-            if left:
-                known = hasattr(self.model, kind)
-                where = [self.name(kind, k) if known else f"{kind} {k}" for k in left]
-                self.tell(kind, NOT_CARRIED, reason, where)
-
 
 def _pose(place: Any, quaternion: Any) -> Pose:
     return Pose.from_array([*place, *np.divide(quaternion, np.linalg.norm(quaternion))])
@@ -469,9 +386,3 @@ def _quaternion(matrix: FloatArray) -> FloatArray:
     found = np.empty(4)
     mujoco.mju_mat2Quat(found, np.ravel(matrix))
     return found
-
-
-def _values(values: FloatArray) -> str:
-    """The different rows that there are, the first few of many."""
-    rows = np.unique(np.reshape(values, (len(values), -1)), axis=0)
-    return named(" ".join(f"{value:.7g}" for value in row.tolist()) for row in rows)

@@ -60,6 +60,31 @@ TOLD: dict[str, tuple[str, str, bool]] = {
 }
 """By field: the quantity, why it is not carried, and whether it is told even where it is usual."""
 
+LIMITS = (
+    "joint solreflimit, solimplimit",
+    "ends of a range are as hard as an engine has them",
+    False,
+)
+FRICTION = (
+    "joint frictionloss",
+    "drives have no friction: what stays where it is pushed in the file may creep, swing or fall",
+    False,
+)
+
+TOLD_ON_JOINTS: dict[str, tuple[str, str, bool]] = {
+    "jnt_margin": ("joint margin", "a range ends at its end, not before it", False),
+    "jnt_solref": LIMITS,
+    "jnt_solimp": LIMITS,
+    "dof_frictionloss": FRICTION,
+    "dof_solref": FRICTION,
+    "dof_solimp": FRICTION,
+    "dof_dampingpoly": TOLD["dof_dampingpoly"],
+}
+"""The same of hinges and sliders."""
+
+HELD_BY_DRIVES = frozenset(("jnt_limited", "jnt_range", "jnt_stiffness", "dof_armature"))
+"""Fields of hinges and sliders that the drives and links of a scene carry."""
+
 DERIVED = frozenset(
     f"{kind}_{name}"
     for kind, names in {

@@ -116,10 +116,10 @@ class Drives:
             for name, inertia in inertias.items()
             if inertia > 0
         }
-        self._motors = [
-            (axis, axis.angle, float(gain), *_stops(axis, eased=axis not in fingers and bool(soft)))
-            for axis, gain, soft in zip(self.axes, self._shares[0], softness, strict=True)
-        ]
+        self._motors = []
+        for axis, gain, soft in zip(self.axes, self._shares[0], softness, strict=True):
+            ends = _stops(axis, eased=axis not in fingers and bool(soft))
+            self._motors.append((axis, axis.joint.setParam, axis.angle, float(gain), *ends))
         self._softness = dict(zip(self.axes, softness, strict=True))
         self._limits = dict(zip(self.axes, robot.column("effort_limit").tolist(), strict=True))
         self._eased: list[Axis] = []
@@ -140,13 +140,14 @@ class Drives:
 
     def act(self) -> None:
         """Before a step: tell the motors what they are asked for."""
-        for (axis, angle, gain, low, high), asked in zip(self._motors, self._asked, strict=True):
+        for motor, asked in zip(self._motors, self._asked, strict=True):
+            axis, tell, angle, gain, low, high = motor
             at = angle()
             velocity = asked - gain * at
-            axis.joint.setParam(VELOCITY, velocity)
+            tell(VELOCITY, velocity)
             if not low < at < high:
                 effort = abs(velocity - axis.rate()) / (self._softness[axis] or 1.0)
-                axis.joint.setParam(MOST_FORCE, min(self._limits[axis], effort))
+                tell(MOST_FORCE, min(self._limits[axis], effort))
                 self._eased.append(axis)
         for rotor in self.rotors.values():
             rotor.turn()

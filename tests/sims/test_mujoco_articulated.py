@@ -144,6 +144,15 @@ def test_nothing_of_a_joint_is_dropped_in_silence(kitchen: Path, old: str, new: 
     assert before.scene != after.scene or before.account != after.account
 
 
+def test_masks_between_links_and_the_rest_are_told(kitchen: Path) -> None:
+    """The floor meets the ball, and no link."""
+    masks = "geom contype, conaffinity"
+    assert masks not in {line.quantity for line in Reading(str(kitchen)).account}
+    text = KITCHEN.replace('mass=".2"', 'mass=".2" contype="3" conaffinity="3"')
+    kitchen.write_text(text.replace('name="floor"', 'name="floor" contype="2" conaffinity="2"'))
+    assert masks in {line.quantity for line in Reading(str(kitchen)).account}
+
+
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
