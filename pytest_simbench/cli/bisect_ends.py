@@ -44,10 +44,10 @@ def bisect_ends(search: Search) -> int:
     settled, ends = _ends(search, place - 1, place)
     print(*sentences(settled.only(ends)), sep="\n")
     print(f"results: {search.folder}")
-    unexplained = bool(settled.moved) and settled.explained(*ends) is None
-    if not unexplained:
-        print(f"so {releases[place]} is not shown to be the cause")
-    return 0 if unexplained else 1
+    if settled.moved and settled.explained(*ends) is None:
+        return 0
+    print(f"so {releases[place]} is not shown to be the cause")
+    return 1
 
 
 def _ends(search: Search, *places: int) -> tuple[Settled, list[Who]]:

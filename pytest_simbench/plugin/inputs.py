@@ -113,13 +113,11 @@ def load_scene(
         elif starts is not None:
             rows = read_starts(request.path.parent / starts, scene)
         scene = replace(scene, starts=rows)
-        if rows:
-            different = distinct(rows)
-            if different < len(rows):
-                tell(
-                    f"{starts}: {len(rows)} starts, and {different} different in how the bodies "
-                    f"lie to each other: as evidence they count as {different}"
-                )
+        if (different := distinct(rows)) < len(rows):
+            tell(
+                f"{starts}: {len(rows)} starts, and {different} different in how the bodies lie to "
+                f"each other: as evidence they count as {different}"
+            )
     except (SimulatorError, SceneError) as error:
         pytest.exit(str(error), returncode=pytest.ExitCode.USAGE_ERROR)
     write_whole(folder, ACCOUNT, markdown(at.name, found.account).encode())

@@ -143,8 +143,7 @@ class Settling(Task):
         ends = {body.name: body.moved_to(world.pose(body.name)) for body in free}
         robot = world.scene.robot
         prepared = None if robot is None else PreparedRobot(robot)
-        start = None if robot is None else robot.column("initial_position")
-        before = {body.name: _place(body) for body in free} | _links(prepared, start)
+        before = {body.name: _place(body) for body in free} | _links(prepared, None)
         after = {name: _place(body) for name, body in ends.items()}
         after |= _links(prepared, world.joints[0])
         ways = {
@@ -171,11 +170,12 @@ class Settling(Task):
 
 def _links(prepared: PreparedRobot | None, positions: FloatArray | None) -> dict[str, Pose]:
     """The moving links of the scene's robot, each at its centre of mass, at joint positions
-    (n_joints,) [rad or m]; none without a robot."""
-    if prepared is None or positions is None:
+    (n_joints,) [rad or m], None: the initial ones; none without a robot."""
+    if prepared is None:
         return {}
-    names = prepared.robot.joint_names
-    poses = link_poses(prepared, dict(zip(names, positions.tolist(), strict=True)))
+    robot = prepared.robot
+    joints = robot.column("initial_position") if positions is None else positions
+    poses = link_poses(prepared, dict(zip(robot.joint_names, joints.tolist(), strict=True)))
     return {
         link.name: poses[link.name] * Pose.at(*link.centre.tolist())
         for link in prepared.moving_links

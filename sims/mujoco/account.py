@@ -24,6 +24,9 @@ mujoco = lazy_import("mujoco")
 
 PLAIN = '<mujoco><worldbody><body>{}<geom size="1"/></body></worldbody></mujoco>'
 
+NAMED = {"jnt": "joint", "dof": "joint"}
+"""What names an element, by how its fields begin."""
+
 
 def tell_the_rest(reading: Reading) -> None:
     """What its bodies and links, once they are read, have not told by themselves."""
@@ -58,7 +61,8 @@ def _tell_shapes(reading: Reading) -> None:
     if seen := np.flatnonzero(~masks.any(axis=1)).tolist():
         names = (reading.name("geom", geom) for geom in seen)
         reading.tell("geom (visual)", NOT_CARRIED, "it cannot collide; its mass counts", names)
-    on_joints = [g for g in reading.solid if reading.on_joint(g)]
+    bodies = {link.body for link in reading.links}
+    on_joints = [g for g in reading.solid if reading.root_of(g) in bodies]
     moving = [*(g for p in reading.placed if p.root for g in p.geoms), *on_joints]
     others = [g for g in [*reading.solid, reading.ground] if g is not None]
     meet = (masks[moving][:, None] & masks[others][:, ::-1]).any(axis=2)
@@ -88,8 +92,8 @@ def _tell_options(reading: Reading) -> None:
         value = np.array([getattr(option, name)])
         if not np.array_equal(value, [getattr(plain, name)]):
             reason = OPTIONS.get(name, "each engine has the options of its profile")
-            told_value = f"{reason}; in the file: {values_of(value)}"
-            reading.tell(f"option {name}", NOT_CARRIED, told_value)
+            reason = f"{reason}; in the file: {values_of(value)}"
+            reading.tell(f"option {name}", NOT_CARRIED, reason)
 
 
 def _tell_fields(
@@ -123,14 +127,10 @@ def _tell_fields(
             odd = np.any(np.reshape(found != usual, (len(found), -1)), axis=1)
             if odd.any() or always:
                 own = [n for n, differs in zip(numbers, odd, strict=True) if differs]
-                names = _owners(reading, kind, own)
+                if kind == "dof":
+                    own = sorted({int(model.dof_jntid[dof]) for dof in own})
+                names = (reading.name(NAMED.get(kind, kind), number) for number in own)
                 reading.tell(quantity, NOT_CARRIED, f"{reason}; {values_of(found)}", names)
-
-
-def _owners(reading: Reading, kind: str, numbers: list[int]) -> list[str]:
-    if kind == "dof":
-        numbers = sorted({int(reading.model.dof_jntid[number]) for number in numbers})
-    return [reading.name("joint" if kind in ("dof", "jnt") else kind, n) for n in numbers]
 
 
 def _tell_objects(reading: Reading) -> None:

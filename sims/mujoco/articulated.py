@@ -118,8 +118,7 @@ class Tree:
     """
 
     def __init__(self, reading: Reading, links: list[OnJoint]) -> None:
-        self.reading, self.links = reading, links
-        self.model = reading.model
+        self.reading, self.links, self.model = reading, links, reading.model
         self._meshes: dict[str, bytes] = {}
         self._coarse: dict[str, float] = {}
         self.servos: set[int] = set()
@@ -159,13 +158,11 @@ class Tree:
         )
 
     def _geoms(self, link: OnJoint) -> list[int]:
-        of = self.model.geom_bodyid
-        return [g for g in self.reading.solid if self.reading.root(int(of[g])) == link.body]
+        return [g for g in self.reading.solid if self.reading.root_of(g) == link.body]
 
     def _frame(self, link: OnJoint) -> Pose:
         """Of the link, at its joint, in the file's world."""
-        body = self.reading.pose(link.body)
-        return body * Pose(vector3(self.model.jnt_pos[link.joint]))
+        return self.reading.pose(link.body) * Pose(vector3(self.model.jnt_pos[link.joint]))
 
     def _link(self, link: OnJoint) -> Link:
         mass, centre, tensor = self.reading.inertial(link.body)
@@ -223,8 +220,7 @@ class Tree:
 
     def _drive(self, link: OnJoint, start: float) -> Joint:
         model, tell, dof = self.model, self.reading.tell, int(self.model.jnt_dofadr[link.joint])
-        stiffness, damping = 0.0, float(model.dof_damping[dof])
-        effort = STRONG
+        stiffness, damping, effort = 0.0, float(model.dof_damping[dof]), STRONG
         spring = float(np.ravel(model.jnt_stiffness[link.joint])[0])
         at = int(model.jnt_qposadr[link.joint])
         if spring and np.isclose(model.qpos_spring[at], model.qpos0[at]):
@@ -246,25 +242,19 @@ class Tree:
     def _servo(self, link: OnJoint) -> tuple[float, float, float] | None:
         """Stiffness, damping and largest effort of a joint's one position actuator; None: it has
         none of that kind."""
-        model, transmission = self.model, mujoco.mjtTrn.mjTRN_JOINT
-        own = [
-            k
-            for k in range(model.nu)
-            if model.actuator_trntype[k] == transmission
-            and model.actuator_trnid[k, 0] == link.joint
-        ]
+        model = self.model
+        at_joint = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+        own = np.flatnonzero(at_joint & (model.actuator_trnid[:, 0] == link.joint)).tolist()
         if len(own) != 1:
             return None
         (k,) = own
         gain, bias = float(model.actuator_gainprm[k, 0]), model.actuator_biasprm[k]
         position = gain > 0 and bias[1] == -gain and not bias[0]
-        plain = model.actuator_gear[k, 0] == 1 and not model.actuator_dyntype[k]
-        if not position or not plain:
+        if not position or model.actuator_gear[k, 0] != 1 or model.actuator_dyntype[k]:
             return None
-        limit = STRONG
-        if model.actuator_forcelimited[k]:
-            limit = float(np.abs(model.actuator_forcerange[k]).min())
         self.servos.add(k)
+        limited = model.actuator_forcelimited[k]
+        limit = float(np.abs(model.actuator_forcerange[k]).min()) if limited else STRONG
         return gain, float(-bias[2]), limit
 
     def _tell(self, frictions: FloatArray) -> None:

@@ -63,7 +63,8 @@ class OwnFile:
         names = {body.name for body in scene.bodies}
         fixed = {body.name: body.fixed for body in scene.bodies}
         own = {body.name: body.fixed for body in reading.scene.bodies}
-        if fixed != own or _joints(scene) != _joints(reading.scene):
+        joints = [s.robot.joint_names if s.robot else () for s in (scene, reading.scene)]
+        if fixed != own or joints[0] != joints[1]:
             raise NotSupportedError(
                 f"scene {scene.name!r} has other bodies than its file {scene.file}, which the "
                 "profile `file` loads; choose another profile"
@@ -78,11 +79,11 @@ class OwnFile:
                 self.placed[body.name] = replace(self.placed[body.name], frame=frame)
         free = [self.placed[body.name] for body in scene.free_bodies]
         self.roots = np.array([p.root for p in free], dtype=int)
-        joints = self.model.body_jntadr[self.roots]
-        self._q = self.model.jnt_qposadr[joints][:, None] + np.arange(7)
-        self._v = self.model.jnt_dofadr[joints][:, None] + np.arange(3)
-        joints = np.array([link.joint for link in reading.links], dtype=int)
-        self._joint_q, self._joint_v = self.model.jnt_qposadr[joints], self.model.jnt_dofadr[joints]
+        flying = self.model.body_jntadr[self.roots]
+        self._q = self.model.jnt_qposadr[flying][:, None] + np.arange(7)
+        self._v = self.model.jnt_dofadr[flying][:, None] + np.arange(3)
+        held = np.array([link.joint for link in reading.links], dtype=int)
+        self._joint_q, self._joint_v = self.model.jnt_qposadr[held], self.model.jnt_dofadr[held]
         self._centres = np.array([p.frame.position for p in free]).reshape(-1, 3)
         self._turns = [p.frame.quaternion for p in free]
         if scene.robot is not None:  # as written, or at the end of a range that begins elsewhere
@@ -184,7 +185,3 @@ class FileReadBack(ReadBack):
             "com": axes @ centre + part.turn.T @ away,
             "inertia": axes @ tensor @ axes.T,
         }
-
-
-def _joints(scene: Scene) -> tuple[str, ...]:
-    return scene.robot.joint_names if scene.robot is not None else ()

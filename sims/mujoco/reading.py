@@ -115,10 +115,9 @@ class Reading:
 
     # What there is
 
-    def on_joint(self, geom: int) -> bool:
-        """Whether a shape is one of a link."""
-        root = self.root(int(self.model.geom_bodyid[geom]))
-        return any(link.body == root for link in self.links)
+    def root_of(self, geom: int) -> int:
+        """The moving body that a shape is a part of; 0: none."""
+        return self.root(int(self.model.geom_bodyid[geom]))
 
     def root(self, body: int) -> int:
         """The moving body that a body is a part of; 0: none, it is fixed."""
@@ -369,13 +368,13 @@ class Reading:
 
     def _start(self, qpos: FloatArray) -> Start:
         """A keyframe's poses of the free bodies, in the frames of the file."""
-        joints = [int(self.model.jnt_qposadr[self.model.body_jntadr[p.root]])
-                  for p in self.placed if p.root]  # fmt: skip
-        free = [p.body.name for p in self.placed if p.root]
-        return tuple(
-            (name, _pose(qpos[k : k + 3], qpos[k + 3 : k + 7]).translated(z=self.lift))
-            for name, k in zip(free, joints, strict=True)
-        )
+        found = []
+        for p in self.placed:
+            if p.root:
+                k = int(self.model.jnt_qposadr[self.model.body_jntadr[p.root]])
+                pose = _pose(qpos[k : k + 3], qpos[k + 3 : k + 7])
+                found.append((p.body.name, pose.translated(z=self.lift)))
+        return tuple(found)
 
 
 def _pose(place: Any, quaternion: Any) -> Pose:

@@ -118,8 +118,10 @@ class Drives:
         }
         self._motors = []
         for axis, gain, soft in zip(self.axes, self._shares[0], softness, strict=True):
-            ends = _stops(axis, eased=axis not in fingers and bool(soft))
-            self._motors.append((axis, axis.joint.setParam, axis.angle, float(gain), *ends))
+            eased = soft is not None and axis not in fingers and not axis.wide
+            stops = [axis.joint.getParam(end) for end in (LO_STOP, HI_STOP)]
+            stops = stops if eased else [-np.inf, np.inf]
+            self._motors.append((axis, axis.joint.setParam, axis.angle, float(gain), *stops))
         self._softness = dict(zip(self.axes, softness, strict=True))
         self._limits = dict(zip(self.axes, robot.column("effort_limit").tolist(), strict=True))
         self._eased: list[Axis] = []
@@ -165,14 +167,6 @@ class Drives:
         return np.array(
             [[axis.position() for axis in self.axes], [axis.rate() for axis in self.axes]]
         )
-
-
-def _stops(axis: Axis, eased: bool) -> tuple[float, float]:
-    """ODE's positions of a joint's stops [rad or m]; endless where its motor is not to be eased
-    there: a wide joint's stops are no business of its motor."""
-    if not eased or axis.wide:
-        return -np.inf, np.inf
-    return axis.joint.getParam(LO_STOP), axis.joint.getParam(HI_STOP)
 
 
 def _law(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations, pairwise
+from itertools import combinations, groupby, pairwise
 
 from pytest_simbench.ground.versions import RELEASE, VersionedName, release_numbers
 from pytest_simbench.measure.settling import ALIKE, Ends, Settled, Who
@@ -66,16 +66,9 @@ def _spans(group: Sequence[Who], releases: Sequence[Who], known: Mapping[Who, st
     """Names of a group; of releases without a gap the first and the last one."""
     if not releases:
         return [known[who] for who in group]
-    spans: list[list[Who]] = []
-    for before, who in zip([None, *releases], releases, strict=False):
-        if who in group:
-            if not spans or before not in group:
-                spans.append([])
-            spans[-1].append(who)
+    spans = [list(run) for inside, run in groupby(releases, group.__contains__) if inside]
     return [
-        " to ".join(dict.fromkeys([known[span[0]], VersionedName.of(span[-1][0]).which]))
-        if len(span) > 1
-        else known[span[0]]
+        " to ".join([known[span[0]], *(VersionedName.of(who[0]).which for who in span[1:][-1:])])
         for span in spans
     ]
 
@@ -87,11 +80,9 @@ def _boundaries(found: Settled, releases: Sequence[Who]) -> list[str]:
         gap, _ = found.apart(found.written[before], found.written[after])
         if gap > ALIKE:
             moved = found.explained(before, after)
-            cause = (
-                "no start that was moved does so"
-                if moved is None
-                else f"a start moved by {_mm(1000 * moved)} does so within one release"
-            )
+            cause = "no start that was moved does so"
+            if moved is not None:
+                cause = f"a start moved by {_mm(1000 * moved)} does so within one release"
             which = VersionedName.of(after[0]).which
             told.append(f"{which} moves the end by {_mm(gap)}: {cause}.")
     return told
