@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pytest_simbench.description.robot_files import keep
-from pytest_simbench.scene import Closure, Gripper, Joint, Pose, Robot, Vector3
+from pytest_simbench.scene import Closure, Coupling, Gripper, Joint, Pose, Robot, Vector3
 from pytest_simbench.scene.robot import FARTHEST, FREE, WIDEST
 
 STRONG = 1e4
@@ -40,6 +40,7 @@ class Part:
         slides: a prismatic joint; else a hinge.
         stiffness, damping: of its drive, see `scene.Joint`; 0: the joint is free.
         effort: of its drive, at most [N m or N].
+        passive_damping, friction, spring, rest: of the joint itself, see `scene.Joint`.
         shape: edges of a box about the centre of mass that collides [m]; None: nothing does.
         on: name of the part that it hangs on, or `MOUNT`; None: on the one before it.
     """
@@ -55,6 +56,10 @@ class Part:
     stiffness: float = FREE
     damping: float = 0.0
     effort: float = FREE
+    passive_damping: float = 0.0
+    friction: float = 0.0
+    spring: float = 0.0
+    rest: float = 0.0
     shape: Vector3 | None = None
     on: str | None = None
 
@@ -64,7 +69,8 @@ class Part:
 
     @property
     def drive(self) -> Joint:
-        return Joint(self.name, self.stiffness, self.damping, self.effort, 0.0, self.start)
+        drive = (self.stiffness, self.damping, self.effort, 0.0, self.start)
+        return Joint(self.name, *drive, self.passive_damping, self.friction, self.spring, self.rest)
 
 
 def mechanism(
@@ -73,6 +79,7 @@ def mechanism(
     base: Pose | None = None,
     friction: float = 1.0,
     closures: tuple[Closure, ...] = (),
+    couplings: tuple[Coupling, ...] = (),
     self_collide: bool = False,
     shape: Vector3 | None = None,
 ) -> Robot:
@@ -82,7 +89,7 @@ def mechanism(
         name: of the robot.
         parts: parents first.
         base: of the mount; None: 2 m above the origin.
-        friction, closures, self_collide: see `scene.Robot`.
+        friction, closures, couplings, self_collide: see `scene.Robot`.
         shape: edges of a box about the mount's origin that collides [m]; None: nothing does.
 
     Raises:
@@ -127,6 +134,7 @@ def mechanism(
         base=base or Pose.at(0.0, 0.0, 2.0),
         friction=friction,
         closures=closures,
+        couplings=couplings,
         self_collide=self_collide,
     )
 

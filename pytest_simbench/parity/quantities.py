@@ -8,7 +8,7 @@
         and of a link that moves {mass, com, inertia, damping, gravity}
     joint/NAME/{axis, limits, effort_limit, stiffness, damping, friction, armature,
         initial_position}
-    closure/NUMBER/points
+    closure/NUMBER/points, coupling/FOLLOWER
 
 Links are those of the prepared robot (`description.urdf`), in which fixed joints are merged; its
 base is the link `base`, whose frame is the world's.
@@ -28,15 +28,16 @@ base is the link `base`, whose frame is the world's.
 - dynamic: 1 if forces can move the body, else 0; a prescribed one is moved by none.
 - velocity: of the centre of mass, then angular, in the world frame, (6,) [m/s, rad/s].
 - touches: the shares of ground, bodies and links that it can collide with, (3,). Links collide
-  with links where the robot has `self_collide`, but for those that one joint joins; what can never
-  meet (fixed things) is left out of count; 0 where nothing is left.
+  with links where the robot has `self_collide`, but for those that one joint joins; what
+  the scene keeps `apart` does not; what can never meet (fixed things) is left out of count; 0 where
+  nothing is left.
 - axis: velocity of the joint's child link at unit joint speed, angular before linear, in that
   link's frame, (6,).
-- damping of a joint: of its drive and all else that resists in proportion to velocity; friction:
-  what resists its motion beside that [N m, N], 0.
+- stiffness and damping of a joint: of its drive and all else that pulls in proportion to position
+  and velocity; friction: what resists its motion beside that [N m, N].
 - points: of a closure of the robot, by its number from 0 on: those that are held together, each in
   its link's frame, (2, 3) [m].
-- coupled: 1 if the fingers are.
+- coupled: 1 if the fingers are. coupling: ratio and offset of a joint to its leader, (2,).
 """
 
 from __future__ import annotations
@@ -85,7 +86,7 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
             quantities[f"body/{body.name}/damping"] = body.damping
     if prepared is not None:
         quantities |= _robot_quantities(prepared.robot, prepared)
-    quantities |= touches(scene, prepared, lambda a, b: _collide(prepared, a, b))
+    quantities |= touches(scene, prepared, lambda a, b: _collide(scene, prepared, a, b))
     own = {f"body/{body.name}/damping" for body in scene.free_bodies if body.damping.any()}
     for pattern, value in settings.quantities().items():
         meant = {name for name in quantities if fnmatchcase(name, pattern)}
@@ -125,15 +126,17 @@ def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
             axis=axes[joint.name],
             limits=prepared.limits[joint.name],
             effort_limit=joint.effort_limit,
-            stiffness=joint.stiffness,
-            damping=joint.damping,
-            friction=0.0,
+            stiffness=joint.stiffness + joint.spring,
+            damping=joint.damping + joint.passive_damping,
+            friction=joint.friction,
             armature=joint.armature,
             initial_position=joint.initial_position,
         )
     for k, closure in enumerate(reduced(prepared)):
         points = np.array([closure.first_point, closure.second_point])
         quantities[f"closure/{k}/points"] = points
+    for pair in robot.couplings:
+        quantities[f"coupling/{pair.follower}"] = np.array([pair.ratio, pair.offset])
     poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
     moving = {link.name for link in prepared.moving_links}
     for link in prepared.links.values():
@@ -186,8 +189,10 @@ def touches(
     }
 
 
-def _collide(prepared: PreparedRobot | None, a: str, b: str) -> bool:
+def _collide(scene: Scene, prepared: PreparedRobot | None, a: str, b: str) -> bool:
     """Whether two of "ground", `body/NAME` and `link/NAME` are to collide."""
+    if scene.kept_apart(a, b):
+        return False
     first, second = a.removeprefix("link/"), b.removeprefix("link/")
     if prepared is None or first == a or second == b:
         return True

@@ -10,7 +10,7 @@ import numpy as np
 
 from pytest_simbench.description.shapes import outlines
 from pytest_simbench.parity.quantities import named, touches
-from pytest_simbench.scene import FloatArray
+from pytest_simbench.scene import Coupling, FloatArray
 
 
 class ReadBack(ABC):
@@ -54,6 +54,9 @@ class ReadBack(ABC):
                 reported |= named(f"joint/{name}", **self.joint(name))
             for k, points in enumerate(self.closures()):
                 reported[f"closure/{k}/points"] = points
+            for pair in robot.couplings:
+                if (told := self.coupling(pair)) is not None:
+                    reported[f"coupling/{pair.follower}"] = told
             coupled = self.coupled(robot.gripper.couplings)
             reported |= {} if coupled is None else {"gripper/coupled": float(coupled)}
         return reported | self.touches()
@@ -101,8 +104,12 @@ class ReadBack(ABC):
         """The points of each closure in the frames of its links, (2, 3) each [m]."""
         return ()
 
-    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool | None:
+    def coupled(self, pairs: tuple[Coupling, ...]) -> bool | None:
         """Whether the fingers of each pair are coupled; None: the engine does not tell."""
+        return None
+
+    def coupling(self, pair: Coupling) -> FloatArray | None:
+        """Ratio and offset of two other joints, (2,); None: the engine does not tell."""
         return None
 
     def touches(self) -> dict[str, Any]:

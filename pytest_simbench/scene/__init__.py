@@ -7,7 +7,7 @@ from pytest_simbench.scene.compound import Compound
 from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.scene.polytope import Polytope, principal
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
-from pytest_simbench.scene.robot import Closure, Gripper, Joint, MotionLimits, Robot
+from pytest_simbench.scene.robot import Closure, Coupling, Gripper, Joint, MotionLimits, Robot
 from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene
 from pytest_simbench.scene.trajectory import Trajectory
 
@@ -19,6 +19,7 @@ __all__ = [
     "Closure",
     "Compound",
     "ConvexMesh",
+    "Coupling",
     "Cylinder",
     "FloatArray",
     "Gripper",

@@ -78,8 +78,13 @@ def _too_deep(scene: Scene, bodies: FloatArray) -> str | None:
         down[k] = everything[k].reach(turn[k, 2][None])[0]
     depth = down - position[:, 2]
     for k in np.flatnonzero(depth[: len(bodies)] > limit[: len(bodies)]):
+        if scene.kept_apart("ground", f"body/{names[k]}"):
+            continue
         return f"{names[k]!r} is {1000 * depth[k]:.0f} mm deep in the ground"
     pairs = [(a, b) for a, b in combinations(range(len(names)), 2) if a < len(bodies)]
+    if scene.apart:
+        told = [f"body/{name}" for name in names]
+        pairs = [(a, b) for a, b in pairs if not scene.kept_apart(told[a], told[b])]
     if not pairs:
         return None
     a, b = np.array(pairs).T

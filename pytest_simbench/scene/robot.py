@@ -34,6 +34,9 @@ others no drive; one whose drives are no springs needs the small effort."""
 class Joint(Wire):
     """One driven joint and its controller: tau = clip(k (q* - q) + d (v* - v) + tau_ff, +-limit).
 
+    What the joint does by itself comes in addition, beyond the drive's limit: tau = spring (rest -
+    q) - passive_damping v, and dry friction.
+
     Attributes:
         name: as in the robot's URDF.
         stiffness: k [N m/rad], or [N/m] for a prismatic joint.
@@ -41,7 +44,14 @@ class Joint(Wire):
         effort_limit: largest effort of the drive [N m], or [N].
         armature: rotor inertia as seen at the joint [kg m^2], or [kg].
         initial_position: [rad], or [m].
+        passive_damping: of the joint itself [N m s/rad], or [N s/m].
+        friction: largest effort with which the joint resists motion [N m], or [N] (Coulomb's dry
+            friction): it holds against what pulls less, and brakes what moves.
+        spring: stiffness of a spring in the joint [N m/rad], or [N/m].
+        rest: position at which that spring is without load [rad], or [m].
     """
+
+    optional = ("passive_damping", "friction", "spring", "rest")
 
     name: str
     stiffness: float
@@ -49,13 +59,19 @@ class Joint(Wire):
     effort_limit: float
     armature: float
     initial_position: float
+    passive_damping: float = 0.0
+    friction: float = 0.0
+    spring: float = 0.0
+    rest: float = 0.0
 
     def __post_init__(self) -> None:
         check_name(self.name, "a joint")
-        for quantity in ("stiffness", "damping", "effort_limit", "armature"):
+        of_drive = ("stiffness", "damping", "effort_limit", "armature")
+        for quantity in (*of_drive, "passive_damping", "friction", "spring"):
             what = f"the {quantity} of joint {self.name!r}"
             check_number(getattr(self, quantity), what, 0.0, STIFFEST)
         check_number(self.initial_position, f"the initial position of joint {self.name!r}")
+        check_number(self.rest, f"the rest position of the spring in joint {self.name!r}")
 
 
 @dataclass(frozen=True)
@@ -87,9 +103,9 @@ class Gripper(Wire):
         check_number(self.squeeze, "the gripper's squeeze [N]", 0.0)
 
     @property
-    def couplings(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of joints that stand at equal positions: the first one, and each other."""
-        return tuple((self.joints[0], other) for other in self.joints[1:])
+    def couplings(self) -> tuple[Coupling, ...]:
+        """Each other joint stands where the first one does."""
+        return tuple(Coupling(other, self.joints[0]) for other in self.joints[1:])
 
 
 @dataclass(frozen=True)
@@ -122,6 +138,33 @@ class Closure(Wire):
     def sides(self) -> tuple[tuple[str, Vector3], tuple[str, Vector3]]:
         """Both links, each with its point."""
         return (self.first, self.first_point), (self.second, self.second_point)
+
+
+@dataclass(frozen=True)
+class Coupling(Wire):
+    """Two joints that move together, as gears do: q_follower = ratio q_leader + offset.
+
+    Attributes:
+        follower, leader: names of the joints.
+        ratio: travel of the follower for that of the leader.
+        offset: position of the follower where the leader is at 0 [rad or m].
+
+    Raises:
+        SceneError: a joint that is coupled with itself, or a number that is none.
+    """
+
+    follower: str
+    leader: str
+    ratio: float = 1.0
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in (self.follower, self.leader):
+            check_name(name, "a joint of a coupling")
+        if self.follower == self.leader:
+            raise SceneError(f"a coupling joins joint {self.leader!r} with itself")
+        check_number(self.ratio, f"the ratio of {self.follower!r} to {self.leader!r}")
+        check_number(self.offset, f"the offset of {self.follower!r} from {self.leader!r}")
 
 
 @dataclass(frozen=True)
@@ -183,9 +226,11 @@ class Robot(Wire):
         closures: what closes loops of its links; only for engines with the capability `loops`.
         self_collide: whether its links collide with each other (SDF's word); two that one joint
             joins never do. Only for engines with the capability `self_collide`.
+        couplings: what moves joints together, beside the gripper; only for engines with the
+            capability `couplings`.
     """
 
-    optional = ("closures", "self_collide")
+    optional = ("closures", "self_collide", "couplings")
     unwritten = ("limits", "swing", "stand")
 
     name: str
@@ -202,6 +247,7 @@ class Robot(Wire):
     stand: Pose | None = field(default=None, compare=False)
     closures: tuple[Closure, ...] = ()
     self_collide: bool = False
+    couplings: tuple[Coupling, ...] = ()
 
     def __post_init__(self) -> None:
         check_name(self.name, "a robot")
@@ -221,6 +267,12 @@ class Robot(Wire):
         if unknown:
             raise SceneError(
                 f"the gripper of {self.name!r} has the joints {', '.join(unknown)}, which have no "
+                f"drives; choose from {', '.join(names)}"
+            )
+        coupled = [name for c in self.couplings for name in (c.follower, c.leader)]
+        if unknown := sorted({name for name in coupled if name not in names}):
+            raise SceneError(
+                f"a coupling of {self.name!r} names the joints {', '.join(unknown)}, which have no "
                 f"drives; choose from {', '.join(names)}"
             )
         if self.limits is not None and len(self.limits.velocity) != len(self.arm_joints):

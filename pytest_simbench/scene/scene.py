@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 
 from pytest_simbench.scene.body import Body
@@ -49,6 +50,8 @@ class Scene(Wire):
             for tasks that go through several; one tuple of names and poses each. Right after a file
             was read they are its keyframes. A worker does not get them.
         friction_rule: what the friction of two surfaces is, one of `friction.RULES`.
+        apart: pairs that do not collide, each two of "ground", `body/NAME` and `link/NAME`; links
+            are those of the reduced robot. Only for engines with the capability `apart`.
         file: that it was read from, an absolute path; empty: none.
         file_timestep: time step that the file asks for [s]; 0: none.
         file_lift: height by which all stands higher here than in the file [m].
@@ -59,7 +62,14 @@ class Scene(Wire):
     """
 
     unwritten = ("starts",)
-    optional = ("ground_restitution", "friction_rule", "file", "file_timestep", "file_lift")
+    optional = (
+        "ground_restitution",
+        "friction_rule",
+        "apart",
+        "file",
+        "file_timestep",
+        "file_lift",
+    )
 
     name: str
     bodies: tuple[Body, ...] = ()
@@ -69,6 +79,7 @@ class Scene(Wire):
     room: Vector3 = field(default=ROOM)
     ground_restitution: float = 0.0
     friction_rule: str = "maximum"
+    apart: tuple[tuple[str, str], ...] = ()
     starts: tuple[Start, ...] = ()
     file: str = ""
     file_timestep: float = 0.0
@@ -98,6 +109,13 @@ class Scene(Wire):
                 raise SceneError(
                     f"scene {self.name!r}: {names.count(name)} bodies are named {name!r}"
                 )
+        known = {"ground", *(f"body/{name}" for name in names)}
+        for name in {name for pair in self.apart for name in pair} - known:
+            if not name.startswith("link/") or self.robot is None:
+                raise SceneError(
+                    f"scene {self.name!r}: {name!r} is kept apart and not there; name two of "
+                    "'ground', 'body/NAME' and 'link/NAME'"
+                )
         for body in self.free_bodies:
             at = zip(map(abs, body.pose.position[:2]), self.room[:2], strict=True)
             if any(value > wall for value, wall in at) or body.pose.position[2] > self.room[2]:
@@ -106,7 +124,7 @@ class Scene(Wire):
                     "it, or give the scene a larger `room`"
                 )
         for a, b in combinations(self.bodies, 2):
-            if not (a.mass or b.mass):
+            if not (a.mass or b.mass) or self.kept_apart(f"body/{a.name}", f"body/{b.name}"):
                 continue
             depth = penetration(a, b)
             if depth > OVERLAP_TOLERANCE:
@@ -134,8 +152,10 @@ class Scene(Wire):
     def words(self) -> frozenset[str]:
         """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `compound`,
         `file` (read from one), `frictions` (several), `restitution`, `damping`, `wrench`,
-        `prescribed`, `loop`, `self_collide`."""
+        `prescribed`, `loop`, `self_collide`, `apart`, and of joints `coupling`, `passive_damping`,
+        `joint_friction`, `spring`."""
         bodies = self.bodies
+        joints = () if self.robot is None else self.robot.joints
         found = {
             "file": bool(self.file),
             "frictions": len(self.frictions) > 1,
@@ -145,6 +165,11 @@ class Scene(Wire):
             "prescribed": bool(self.prescribed_bodies),
             "loop": self.robot is not None and bool(self.robot.closures),
             "self_collide": self.robot is not None and self.robot.self_collide,
+            "apart": bool(self.apart),
+            "coupling": self.robot is not None and bool(self.robot.couplings),
+            "passive_damping": any(joint.passive_damping for joint in joints),
+            "joint_friction": any(joint.friction for joint in joints),
+            "spring": any(joint.spring for joint in joints),
         }
         kinds = {part.kind for body in bodies for part in (body, *body.parts)}
         return frozenset(kinds | {word for word, there in found.items() if there})
@@ -154,6 +179,14 @@ class Scene(Wire):
         """Of all surfaces: the ground, the bodies, the robot."""
         robot = () if self.robot is None else (self.robot.friction,)
         return frozenset((self.ground_friction, *robot, *(body.friction for body in self.bodies)))
+
+    def kept_apart(self, first: str, second: str) -> bool:
+        """Whether two of "ground", `body/NAME` and `link/NAME` are a pair of `apart`."""
+        return frozenset((first, second)) in self._apart
+
+    @cached_property
+    def _apart(self) -> frozenset[frozenset[str]]:
+        return frozenset(map(frozenset, self.apart))
 
     def body(self, name: str) -> Body:
         """The body of that name.

@@ -29,6 +29,10 @@ class Capability(StrEnum):
     """Links may close loops, see `scene.Closure`."""
     SELF_COLLIDE = "self_collide"
     """Links of a robot may collide with each other, see `scene.Robot`."""
+    COUPLINGS = "couplings"
+    """Joints may move together, see `scene.Coupling`."""
+    APART = "apart"
+    """Pairs may be kept from colliding, see `scene.Scene`."""
     JOINT_WRENCHES = "joint_wrenches"
     """It tells what each joint transmits."""
     DETERMINISTIC = "deterministic"
@@ -245,6 +249,14 @@ BEYOND = {
     "loop": (
         Capability.LOOPS,
         "closes no loops of links, and the robot of scene {!r} has one",
+    ),
+    "coupling": (
+        Capability.COUPLINGS,
+        "couples no joints but those of a gripper, and the robot of scene {!r} has such",
+    ),
+    "apart": (
+        Capability.APART,
+        "keeps no pairs from colliding, and scene {!r} has such",
     ),
     "self_collide": (
         Capability.SELF_COLLIDE,

@@ -18,6 +18,7 @@ from pytest_simbench.testing import (  # noqa: F401  they register their checks
     drives,
     dynamics,
     interaction,
+    joints,
     parity,
     physics,
     state,

@@ -46,12 +46,14 @@ class Fault:
         quantity: that must be found to differ.
         plant: makes the faulty scene.
         needs: the capability without which an engine cannot be wrong in this way.
+        word: of `Deviation.only`, by which an adapter declares that its engine has no such thing.
     """
 
     what: str
     quantity: str
     plant: Plant
     needs: Capability | None = None
+    word: str = ""
 
 
 TURNED, SPIN = Pose.at(0.5, 0.1, 0.315, yaw=0.4), (0.7, -0.5, 0.4)
@@ -118,6 +120,11 @@ def of_joints(*names: str, farther: float = 0.0, **factors: float) -> Plant:
         return robot
 
     return of_robot(change)
+
+
+def with_own(joint: str, **values: float) -> Plant:
+    """What the joint does by itself, see `scene.Joint`."""
+    return of_robot(lambda robot: scenes.with_joint(robot, joint, **values))
 
 
 def edited(path: str, edit: Edit) -> Plant:
@@ -218,7 +225,7 @@ def robot_faults(robot: Robot) -> dict[str, Fault]:
     moved, fingers = children[middle], robot.gripper.joints
     joint, link = f"joint[@name='{middle}']", f"link[@name='{moved}']"
     inertial, drive, of_link = f"{link}/inertial", f"joint/{middle}", f"link/{moved}"
-    rows: dict[str, tuple[str, str, Plant]] = {
+    rows: dict[str, tuple[Any, ...]] = {
         "joint_origin": (f"{middle} is 10 mm aside", f"{of_link}/pose",
                          edited(joint, shift(y=0.01))),
         "joint_axis": (f"the axis of {middle} is turned by 5 degrees", f"{drive}/axis",
@@ -245,6 +252,12 @@ def robot_faults(robot: Robot) -> dict[str, Fault]:
                          of_joints(middle, effort_limit=2.0)),
         "armature": (f"{middle} has half its rotor inertia", f"{drive}/armature",
                      of_joints(middle, armature=0.5)),
+        "passive_damping": (f"{middle} is damped beside its drive", f"{drive}/damping",
+                            with_own(middle, passive_damping=3.0), None, "passive_damping"),
+        "joint_friction": (f"{middle} has dry friction", f"{drive}/friction",
+                           with_own(middle, friction=2.0), None, "joint_friction"),
+        "spring": (f"{middle} has a spring beside its drive", f"{drive}/stiffness",
+                   with_own(middle, spring=70.0), None, "spring"),
         "initial_position": (f"{middle} starts 10 mrad farther", f"{drive}/initial_position",
                              of_joints(middle, farther=0.01)),
     }  # fmt: skip
@@ -270,6 +283,8 @@ _ROWS: dict[str, tuple[Any, ...]] = {
     "self_collide": ("the robot's links collide with each other", "link/panda_link4/touches",
                      of_robot(lambda robot: replace(robot, self_collide=True)),
                      Capability.SELF_COLLIDE),
+    "apart": ("brick and cube pass through each other", "body/cube/touches",
+              of_scene(apart=(("body/cube", "body/brick"),)), Capability.APART),
     "body_mass": ("the brick weighs 1 kg", "body/brick/mass", of_body("brick", mass=1.0)),
     "body_size": ("the brick is 2 mm thinner", "body/brick/boxes",
                   of_body("brick", size=_THINNER)),

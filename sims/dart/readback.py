@@ -14,7 +14,7 @@ import numpy as np
 from pytest_simbench.description.shapes import DIRECTIONS, box_reach, cylinder_reach, round_reach
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import Coupling, FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
 dartpy = lazy_import("dartpy")
@@ -109,9 +109,9 @@ class ReadBack(readback.ReadBack):
             "initial_position": joint.getPosition(0),
         }
 
-    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
+    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
         mimic = dartpy.dynamics.ActuatorType.MIMIC
-        return all(self.robot.getJoint(other).getActuatorType() == mimic for _, other in pairs)
+        return all(self.robot.getJoint(p.follower).getActuatorType() == mimic for p in pairs)
 
     def _measured(self, shape: Any, place: Any) -> FloatArray:
         """The reach of a mesh in the frame at `place`."""

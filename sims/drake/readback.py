@@ -18,7 +18,7 @@ from pytest_simbench.description.shapes import (
 )
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
-from pytest_simbench.scene import Body, FloatArray, Pose
+from pytest_simbench.scene import Body, Coupling, FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import
 
 from .world import World, transform
@@ -107,7 +107,7 @@ class ReadBack(readback.ReadBack):
             "initial_position": joint.GetOnePosition(self.context),
         }
 
-    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
+    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
         active = self.plant.GetConstraintActiveStatus
         return all(active(self.context, made) for made in self.made.couplings)
 

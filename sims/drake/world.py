@@ -235,8 +235,8 @@ class World:
             made.set_controller_gains(trees.PdControllerGains(p=drive.stiffness, d=drive.damping))
             self.drives[drive.name] = made
         self.couplings = [
-            plant.AddCouplerConstraint(self.joints[first], self.joints[second], 1.0)
-            for first, second in robot.gripper.couplings
+            plant.AddCouplerConstraint(self.joints[pair.leader], self.joints[pair.follower], 1.0)
+            for pair in robot.gripper.couplings
         ]
         for closure in reduced(prepared):
             first, second = self.links[closure.first], self.links[closure.second]

@@ -27,7 +27,7 @@ from pytest_simbench.description.shapes import (
 )
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import Coupling, FloatArray, Pose
 
 from .bindings import bindings
 from .geometry import matrix, number, numbers, pose, pose_in, truth, vector
@@ -151,8 +151,8 @@ class ReadBack(readback.ReadBack):
             "initial_position": self.drives.state()[0, index],
         }
 
-    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
-        return all(self._coupled(*pair) for pair in pairs)
+    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
+        return all(self._coupled(pair.leader, pair.follower) for pair in pairs)
 
     def _coupled(self, first: str, other: str) -> bool:
         if not self.physics.coupled:

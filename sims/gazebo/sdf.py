@@ -224,7 +224,7 @@ def _add_robot(world: ET.Element, scene: Scene, prepared: PreparedRobot, physics
             tensor = link.inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
             _add_inertial(element, link.mass, Pose.at(x, y, z), tensor)
         _add_shapes(element, link.shapes, robot.friction, physics)
-    couplings = {other: first for first, other in robot.gripper.couplings}
+    couplings = {pair.follower: pair.leader for pair in robot.gripper.couplings}
     for joint in prepared.joints:
         _add_joint(model, joint, prepared, physics, couplings.get(joint.name))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from pytest_simbench.description.shapes import box_reach, cylinder_reach, placed, reach, round_reach
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
-from pytest_simbench.scene import FloatArray, Pose, rotation_matrix
+from pytest_simbench.scene import Coupling, FloatArray, Pose, rotation_matrix
 from pytest_simbench.simulator import heavy, lazy_import
 
 from ..mujoco.bounces import bounce
@@ -52,7 +52,7 @@ class ReadBack(readback.ReadBack):
             found |= {"damping": self._damping(part), "velocity": self._velocity(part)}
         return found
 
-    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
+    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
         return all(map(self._coupled, pairs))
 
     def closures(self) -> list[FloatArray]:
@@ -146,8 +146,8 @@ class ReadBack(readback.ReadBack):
         first, second, kinds = (self._array("equalities", name)[:many, 0] for name in names)
         return first, second, kinds
 
-    def _coupled(self, fingers: Sequence[str]) -> bool:
-        joints = {self.robot.get_joint(name).idx for name in fingers}
+    def _coupled(self, pair: Coupling) -> bool:
+        joints = {self.robot.get_joint(name).idx for name in (pair.leader, pair.follower)}
         return any(
             {a, b} == joints and kind == genesis.EQUALITY_TYPE.JOINT
             for a, b, kind in zip(*self._equalities(), strict=True)

@@ -57,7 +57,7 @@ class MuJoCo(Simulator):
         oldest_version="3.2.4",  # before it `MjSpec` tells Python no lists of geoms and joints
         capabilities=Capability.named(
             "window offscreen save_restore exact_restore contact_count contact_forces compound "
-            "loops self_collide joint_wrenches deterministic"
+            "loops couplings apart self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),

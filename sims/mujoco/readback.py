@@ -19,7 +19,7 @@ from pytest_simbench.description.shapes import (
 )
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
-from pytest_simbench.scene import Body, FloatArray, Pose
+from pytest_simbench.scene import Body, Coupling, FloatArray, Pose
 from pytest_simbench.scene.pose import quaternion_of
 from pytest_simbench.simulator import heavy, lazy_import
 
@@ -97,8 +97,17 @@ class ReadBack(readback.ReadBack):
     def closures(self) -> list[FloatArray]:
         return closed(self.model, self.active)
 
-    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
-        return all(map(self._coupled, pairs))
+    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
+        return all(np.array_equal(self.coupling(pair), [1.0, 0.0]) for pair in pairs)
+
+    def coupling(self, pair: Coupling) -> FloatArray:
+        """Of an active constraint between both joints, else not a number."""
+        model, joints = self.model, [self.at.joints[n] for n in (pair.follower, pair.leader)]
+        for k in np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_JOINT) & self.active):
+            offset, ratio, *higher = model.eq_data[k, :5]
+            if [model.eq_obj1id[k], model.eq_obj2id[k]] == joints and not any(higher):
+                return np.array([ratio, offset])
+        return np.full(2, np.nan)
 
     def body(self, part: Part, name: str) -> dict[str, Any]:
         model, body = self.model, part.body
@@ -267,16 +276,6 @@ class ReadBack(readback.ReadBack):
             "armature": model.dof_armature[dof],
             "initial_position": self.data.qpos[model.jnt_qposadr[joint]],
         }
-
-    def _coupled(self, fingers: tuple[str, str]) -> bool:
-        """Whether an active constraint holds two fingers at equal positions."""
-        model, joints = self.model, {self.at.joints[name] for name in fingers}
-        found = np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_JOINT) & self.active)
-        return any(
-            {model.eq_obj1id[k], model.eq_obj2id[k]} == joints
-            and list(model.eq_data[k, :5]) == [0, 1, 0, 0, 0]
-            for k in found
-        )
 
 
 _OFF = ("GRAVITY", "CONTACT", "CONSTRAINT", "EQUALITY", "LIMIT", "ACTUATION")

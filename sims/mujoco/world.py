@@ -14,6 +14,7 @@ from pytest_simbench.scene import (
     Capsule,
     Closure,
     ConvexMesh,
+    Coupling,
     Cylinder,
     FloatArray,
     Joint,
@@ -42,6 +43,9 @@ def build(scene: Scene, prepared: PreparedRobot | None, settings: MuJoCoSettings
     _set_options(spec, scene, settings)
     if prepared is not None:
         _equip(spec, prepared, settings)
+    for pair in scene.apart:
+        first, second = ("world" if n == "ground" else n.partition("/")[2] for n in pair)
+        spec.add_exclude(bodyname1=first, bodyname2=second)
     ground = spec.worldbody.add_geom(
         name="ground",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -66,8 +70,8 @@ def _equip(spec: Any, prepared: PreparedRobot, settings: MuJoCoSettings) -> None
         geom.rgba = LINK_COLOUR
     for joint in robot.joints:
         _add_drive(spec, joint)
-    for pair in robot.gripper.couplings:
-        _couple_fingers(spec, *pair)
+    for pair in (*robot.gripper.couplings, *robot.couplings):
+        _couple(spec, pair)
     close_loops(spec, reduced(prepared))
     for moved in prepared.joints if robot.self_collide else ():
         # MuJoCo parts what one joint joins by itself, but where one link is fixed in the world.
@@ -196,7 +200,13 @@ def _add_drive(spec: Any, joint: Joint) -> None:
     )
     drive.gainprm[0] = joint.stiffness
     drive.biasprm[1], drive.biasprm[2] = -joint.stiffness, -joint.damping
-    _joint(spec, joint.name).armature = joint.armature
+    moved = _joint(spec, joint.name)
+    moved.armature, moved.frictionloss, moved.springref = joint.armature, joint.friction, joint.rest
+    # with MuJoCo's own 20 ms what friction holds creeps by 10 mm/s under 0.8 of its largest effort
+    moved.solref_friction = [2 * spec.option.timestep, 1.0]
+    for field, value in (("damping", joint.passive_damping), ("stiffness", joint.spring)):
+        polynomial = np.atleast_1d(getattr(moved, field))  # a number in releases before 3.5
+        setattr(moved, field, [value, *polynomial[1:]] if len(polynomial) > 1 else value)
 
 
 def _joint(spec: Any, name: str) -> Any:
@@ -206,14 +216,14 @@ def _joint(spec: Any, name: str) -> Any:
     return next(joint for joint in spec.joints if joint.name == name)  # before 3.3.0
 
 
-def _couple_fingers(spec: Any, first: str, second: str) -> None:
-    """Hold two fingers at equal positions, by a constraint as stiff as the step allows."""
+def _couple(spec: Any, pair: Coupling) -> None:
+    """Move two joints together, by a constraint as stiff as the step allows."""
     spec.add_equality(
         type=mujoco.mjtEq.mjEQ_JOINT,
         objtype=mujoco.mjtObj.mjOBJ_JOINT,
-        name1=second,
-        name2=first,
-        data=[0.0, 1.0, *[0.0] * (mujoco.mjNEQDATA - 2)],
+        name1=pair.follower,
+        name2=pair.leader,
+        data=[pair.offset, pair.ratio, *[0.0] * (mujoco.mjNEQDATA - 2)],
         solref=[2 * spec.option.timestep, 1.0],
     )
 

@@ -103,8 +103,8 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
     joints = names(builder.joint_label)
     for joint in robot.joints:
         _set_drive(builder, joints.index(joint.name), joint)
-    for first, second in robot.gripper.couplings:
-        builder.set_joint_mimic(joints.index(second), joints.index(first))
+    for pair in robot.gripper.couplings:
+        builder.set_joint_mimic(joints.index(pair.follower), joints.index(pair.leader))
     links = names(builder.body_label)
     for closure in reduced(prepared):
         newton.solvers.mujoco.add_equality_connect(

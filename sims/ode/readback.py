@@ -18,7 +18,7 @@ from pytest_simbench.description.shapes import (
     round_reach,
 )
 from pytest_simbench.parity import readback
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import Coupling, FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
 from .axes import Axis
@@ -57,7 +57,7 @@ class ReadBack(readback.ReadBack):
     def closures(self) -> list[FloatArray]:
         return [self._points(joint) for joint in self.loops]
 
-    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
+    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
         return bool(self.drives.pinion.holds if self.drives.pinion else not pairs)
 
     def pose(self, part: Part) -> FloatArray:

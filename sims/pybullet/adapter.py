@@ -187,7 +187,8 @@ class PyBullet(Simulator):
         for joint in self._joints:
             pybullet.enableJointForceTorqueSensor(self._robot, joint, True, physicsClientId=c)
         self._couplings = [
-            self._couple(index[first], index[second]) for first, second in robot.gripper.couplings
+            self._couple(index[pair.leader], index[pair.follower])
+            for pair in robot.gripper.couplings
         ]
         self._closures = [
             close_loop(c, self._robot, self._links, closure) for closure in reduced(prepared)

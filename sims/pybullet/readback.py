@@ -13,7 +13,7 @@ import numpy as np
 
 from pytest_simbench.description.shapes import box_reach, cylinder_reach, placed, reach, round_reach
 from pytest_simbench.parity import readback
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import Coupling, FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import
 
 from .world import inertial_frame, points, pose_of
@@ -139,7 +139,7 @@ class ReadBack(readback.ReadBack):
             [turn @ np.array(angular)[:, column], turn @ np.array(linear)[:, column]]
         )
 
-    def coupled(self, pairs: tuple[tuple[str, str], ...]) -> bool:
+    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
         """Whether the constraints are gears between the fingers."""
         found = set()
         for constraint in self.couplings:
@@ -147,7 +147,7 @@ class ReadBack(readback.ReadBack):
             if info[0] == info[2] == self.robot and info[4] == pybullet.JOINT_GEAR:
                 found.add(frozenset((info[1], info[3])))
         joints = dict(zip(self.prepared.robot.joint_names, self.joints, strict=True))
-        return found == {frozenset(joints[name] for name in pair) for pair in pairs}
+        return found == {frozenset((joints[p.leader], joints[p.follower])) for p in pairs}
 
     def _held(self) -> set[int]:
         """Bodies that a constraint holds."""

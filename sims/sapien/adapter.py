@@ -156,7 +156,7 @@ class SAPIEN(Simulator):
             joint.set_armature([drive.armature])
             joint.set_friction(self.settings.joint_friction)
         for pair in robot.gripper.couplings:
-            self._couple_fingers(*pair)
+            self._couple_fingers(pair.leader, pair.follower)
         self._closures = [self._close(closure) for closure in reduced(prepared)]
         initial = np.empty(len(order))
         initial[self._order] = robot.column("initial_position")

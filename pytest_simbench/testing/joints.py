@@ -1,0 +1,220 @@
+"""Checks of what a joint does by itself (damping, friction, a spring), of joints that move together
+and of pairs that are kept apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench.laws.mechanisms import STRONG, Part, Y, mechanism
+from pytest_simbench.scene import (
+    STANDARD_GRAVITY,
+    Box,
+    Coupling,
+    FloatArray,
+    Pose,
+    Robot,
+    Scene,
+    Vector3,
+)
+from pytest_simbench.simulator import Capability
+from pytest_simbench.testing import scenes
+from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.subject import Subject, logged, require, require_close
+
+G = -STANDARD_GRAVITY[2]
+
+MASS = 1.0
+"""Of what moves on a joint here [kg]."""
+
+LEVER = 0.3
+"""From the axis of a hinge to the centre of mass [m]."""
+
+INERTIA: Vector3 = (0.01, 0.01, 0.01)
+"""About that centre [kg m^2]."""
+
+ABOUT_AXIS = INERTIA[1] + MASS * LEVER**2
+
+SECONDS = 0.5
+
+Z: Vector3 = (0.0, 0.0, 1.0)
+
+Acceleration = Callable[[float, float], float]
+"""Of a joint, by its position and velocity."""
+
+
+def slider(name: str, **values: Any) -> Part:
+    """A mass on a vertical slider, which falls."""
+    return Part(name, Z, slides=True, inertia=INERTIA, **values)
+
+
+def lever(name: str, offset: Vector3 = (0.0, 0.0, 0.0), **values: Any) -> Part:
+    """A mass on a hinge, beside it at position 0; it falls to positive positions."""
+    return Part(name, Y, offset, (LEVER, 0.0, 0.0), inertia=INERTIA, on="mount", **values)
+
+
+def followed(law: Acceleration, time: FloatArray) -> FloatArray:
+    """Positions from rest at 0, by the fourth-order method of Runge and Kutta in steps of 20 us."""
+    count = int(np.ceil(float(time[-1]) / 2e-5)) + 1
+    h = float(time[-1]) / (count - 1)
+    q, v, found = 0.0, 0.0, [0.0]
+    for _ in range(count - 1):
+        a1 = law(q, v)
+        a2 = law(q + h / 2 * v, v + h / 2 * a1)
+        a3 = law(q + h / 2 * v + h * h / 4 * a1, v + h / 2 * a2)
+        a4 = law(q + h * v + h * h / 2 * a2, v + h * a3)
+        q, v = q + h * v + h * h / 6 * (a1 + a2 + a3), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+        found.append(q)
+    return np.interp(time, h * np.arange(count), found)
+
+
+def declared(subject: Subject, word: str) -> None:
+    """Skip where the adapter declares what it lacks of scenes with this word."""
+    for deviation in subject.cls.info.deviations:
+        if deviation.only == word and deviation.within is None:
+            pytest.skip(deviation.reason)
+
+
+def moves(subject: Subject, robot: Robot) -> tuple[FloatArray, FloatArray]:
+    """Times, (n,) [s], and positions of the joints, (n, n_joints), of what nobody drives."""
+    with subject.world(Scene(robot.name, robot=robot)) as world:
+        motion = logged(world.wait(SECONDS, log_period=0.01))
+    return motion.time, motion.joints[:, 0]
+
+
+def moves_by(subject: Subject, part: Part, law: Acceleration) -> None:
+    """One part on its joint moves as the law says, within 2 % of its way and two steps' travel."""
+    time, positions = moves(subject, mechanism(part.name, part))
+    right = followed(law, time)
+    allowed = _allowed(subject, time, right)
+    worst = int(np.abs(positions[:, 0] - right).argmax())
+    what = f"position of {part.name} after {time[worst]:.2f} s"
+    unit = "m" if part.slides else "rad"
+    require_close(what, float(positions[worst, 0]), float(right[worst]), allowed, unit)
+
+
+def _allowed(subject: Subject, time: FloatArray, right: FloatArray) -> float:
+    """2 % of the way, and the travel of two steps [rad or m]."""
+    fastest = float(np.abs(np.gradient(right, time)).max())
+    return 0.02 * float(np.ptp(right)) + 2 * subject.timestep * fastest
+
+
+def held(subject: Subject, part: Part) -> None:
+    """What pulls less than the friction moves nothing: 2 mm or 5 mrad in half a second."""
+    _, positions = moves(subject, mechanism(part.name, part))
+    way, unit = (2e-3, "m") if part.slides else (5e-3, "rad")
+    require_close(f"creep of {part.name}", float(np.abs(positions).max()), 0.0, way, unit)
+
+
+def turning(q: float) -> float:
+    """Torque of the weight of a lever [N m]."""
+    return MASS * G * LEVER * float(np.cos(q))
+
+
+@check()
+def joints_are_damped(subject: Subject) -> None:
+    """A mass on a slider falls against 20 N s/m, up to 0.49 m/s, and a lever against 1 N m s/rad,
+    as the equation of motion says, though the drive's effort limit is next to nothing."""
+    declared(subject, "passive_damping")
+    moves_by(
+        subject, slider("damped slider", passive_damping=20.0), lambda q, v: -G - 20 * v / MASS
+    )
+    damped = lever("damped lever", passive_damping=1.0)
+    moves_by(subject, damped, lambda q, v: (turning(q) - v) / ABOUT_AXIS)
+
+
+@check()
+def joints_have_friction(subject: Subject) -> None:
+    """Of a mass on a slider and of a lever: friction of 1.25 times the weight's effort holds it,
+    with 0.6 times it falls with the rest."""
+    declared(subject, "joint_friction")
+    weight, torque = MASS * G, MASS * G * LEVER
+    held(subject, slider("held slider", friction=1.25 * weight))
+    held(subject, lever("held lever", friction=1.25 * torque))
+    moves_by(subject, slider("braked slider", friction=0.6 * weight), lambda q, v: -0.4 * G)
+    moves_by(
+        subject,
+        lever("braked lever", friction=0.6 * torque),
+        lambda q, v: max(turning(q) - 0.6 * torque, 0.0) / ABOUT_AXIS,
+    )
+
+
+@check()
+def joints_have_springs(subject: Subject) -> None:
+    """A mass on a slider swings about where its spring of 200 N/m, at rest 0.1 m above, holds its
+    weight; a lever likewise. A drive as stiff that holds 0 doubles stiffness and halves the way."""
+    declared(subject, "spring")
+    part = slider("sprung slider", spring=200.0, rest=0.1)
+    moves_by(subject, part, lambda q, v: -G + 200 * (0.1 - q) / MASS)
+    part = lever("sprung lever", spring=20.0, rest=-0.4)
+    moves_by(subject, part, lambda q, v: (turning(q) + 20 * (-0.4 - q)) / ABOUT_AXIS)
+    driven = slider("driven slider", spring=200.0, rest=0.1, stiffness=200.0, effort=STRONG)
+    excused = subject.cls.info.deviations
+    if not any(d.excuses(f"joint/{driven.name}/stiffness") for d in excused):
+        moves_by(subject, driven, lambda q, v: -G + (200 * (0.1 - q) - 200 * q) / MASS)
+
+
+@check(Capability.COUPLINGS)
+def joints_move_together(subject: Subject) -> None:
+    """A lever falls and turns another one, -0.5 times as far and from 0.2 rad: within 5 mrad, and
+    as fast as both inertias let it (2 %)."""
+    pair = Coupling("turned", "falling", -0.5, 0.2)
+    robot = mechanism(
+        "coupled levers",
+        lever("falling"),
+        lever("turned", (0.0, 0.5, 0.0), start=0.2),
+        couplings=(pair,),
+    )
+    time, positions = moves(subject, robot)
+    apart = positions[:, 1] - (pair.ratio * positions[:, 0] + pair.offset)
+    require_close("gap of the coupled joints", float(np.abs(apart).max()), 0.0, 5e-3, "rad")
+
+    def law(q: float, v: float) -> float:
+        torque = turning(q) + pair.ratio * turning(pair.ratio * q + pair.offset)
+        return torque / (ABOUT_AXIS * (1 + pair.ratio**2))
+
+    right = followed(law, time)
+    allowed = _allowed(subject, time, right)
+    worst = int(np.abs(positions[:, 0] - right).argmax())
+    what = f"position of the falling lever after {time[worst]:.2f} s"
+    require_close(what, float(positions[worst, 0]), float(right[worst]), allowed, "rad")
+
+
+@check(Capability.APART)
+def pairs_are_kept_apart(subject: Subject) -> None:
+    """Three cubes fall on a table: one lies on it, one that is kept apart from it falls through and
+    lies on the ground, one that is kept apart from both is below the ground. A lever with a shape
+    falls through a post that it is kept apart from, and is stopped by one that it is not."""
+    top, edge = 0.3, scenes.EDGE
+    for kept in (False, True):
+        cubes = [
+            scenes.cube(name, Pose.at(0.0, y, top + edge / 2 + 0.01))
+            for name, y in (("held", -0.2), ("let", 0.0), ("lost", 0.2))
+        ]
+        table = Box("table", (0.4, 0.6, 0.04), Pose.at(0.0, 0.0, top - 0.02))
+        post = Box("post", (0.1, 0.1, 0.5), Pose.at(1.25, 0.0, 1.53))
+        swing = Part("swing", Y, centre=(LEVER, 0.0, 0.0), inertia=INERTIA, shape=(0.1, 0.05, 0.05))
+        robot = mechanism("swing", swing, base=Pose.at(1.0, 0.0, 2.0))
+        pairs = (
+            ("body/let", "body/table"),
+            ("body/table", "body/lost"),
+            ("ground", "body/lost"),
+            (f"link/{swing.link}", "body/post"),
+        )
+        scene = Scene("apart", (table, post, *cubes), robot, apart=pairs if kept else ())
+        with subject.world(scene) as world:
+            world.wait(SECONDS)
+            heights, angle = world.bodies[:, 2], float(world.joints[0, 0])
+        lying = top + edge / 2
+        right = (lying, edge / 2, None) if kept else (lying,) * 3
+        for cube, height, expected in zip(cubes, heights, right, strict=True):
+            what = f"height of the cube {cube.name!r}, kept {'apart' if kept else 'nowhere'}"
+            if expected is None:
+                require(height < -edge, f"{what}, is {height:.3g} m: it lies on something")
+            else:
+                require_close(what, float(height), expected, 2e-3, "m")
+        far = angle > 1.2
+        require(far == kept, f"a lever and a post, {kept = }: the lever turns to {angle:.3g} rad")
