@@ -61,7 +61,7 @@ class FileRead(TypedDict):
     boundary."""
 
     scene: dict[str, Any]
-    starts: list[list[tuple[str, np.ndarray]]]
+    starts: list[dict[str, Any]]
     account: list[dict[str, str]]
 
 

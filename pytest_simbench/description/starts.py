@@ -9,9 +9,8 @@ import numpy as np
 
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.ground.files import FileError, read_arrays
-from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.scene import FloatArray, Pose, Scene, Start
 from pytest_simbench.scene.checks import UNIT_TOLERANCE
-from pytest_simbench.scene.scene import Start
 
 LARGEST = 64 * 2**20
 """Of a file of starts [bytes]."""
@@ -50,26 +49,28 @@ def read_starts(path: str | Path, scene: Scene) -> tuple[Start, ...]:
                 f"{path}: the quaternion of {name!r} in row {row} has no unit length"
             )
     rows = range(counts.pop())
+    bodies, lift = tuple(sorted(arrays)), scene.file_lift
     return tuple(
-        tuple(
-            (name, Pose.from_array(arrays[name][row]).translated(z=scene.file_lift))
-            for name in sorted(arrays)
+        Start(
+            bodies,
+            tuple(Pose.from_array(arrays[name][row]).translated(z=lift) for name in bodies),
         )
         for row in rows
     )
 
 
 def distinct(starts: Sequence[Start], tolerance: float = 1e-6) -> int:
-    """How many of the starts are different, seen from the first body of each.
+    """How many of the starts are different, in joints and seen from the first body of each.
 
     Starts that place the same things alike elsewhere on a table are one experiment, done again.
     Positions [m] and quaternions are the same up to `tolerance`.
     """
     seen: list[FloatArray] = []
     for start in starts:
-        (_, first), *others = start
-        rows = np.array([(first.inverse() * pose).as_array() for _, pose in others]).reshape(-1, 7)
+        first, *others = start.poses or (Pose(),)
+        rows = np.array([(first.inverse() * pose).as_array() for pose in others]).reshape(-1, 7)
         rows[rows[:, 3] < 0, 3:] *= -1
-        if not any(np.allclose(rows, known, atol=tolerance) for known in seen):
-            seen.append(rows)
+        found = np.array([*rows.ravel(), *start.positions])
+        if not any(np.allclose(found, known, atol=tolerance) for known in seen):
+            seen.append(found)
     return len(seen)

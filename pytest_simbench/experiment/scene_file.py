@@ -14,7 +14,7 @@ from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.description.carried import Carried
 from pytest_simbench.description.mjcf_check import check_mjcf
 from pytest_simbench.ground.errors import DescriptionError
-from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.scene import Scene, Start
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.registry import adapter, address, registered
 
@@ -95,8 +95,6 @@ def _ask(name: str, path: Path, size: int, modified: int) -> SceneFile:
         except WorkerError as error:
             raise DescriptionError(error.what) from None
     account = tuple(Carried.from_wire(line) for line in answer["account"])
-    keyframes = tuple(
-        tuple((name, Pose.from_array(pose)) for name, pose in start) for start in answer["starts"]
-    )
+    keyframes = tuple(map(Start.from_wire, answer["starts"]))
     scene = replace(Scene.from_wire(answer["scene"]), starts=keyframes)
     return SceneFile(path, scene, account)

@@ -17,8 +17,7 @@ from pytest_simbench.plugin import options
 from pytest_simbench.plugin.arguments import failing
 
 if TYPE_CHECKING:
-    from pytest_simbench.scene import Scene
-    from pytest_simbench.scene.scene import Start
+    from pytest_simbench.scene import Scene, Start
 
 ACCOUNT = "carried.md"
 """Of the run folder: what of the scenes' files was carried."""

@@ -8,7 +8,7 @@ from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.scene.polytope import Polytope, principal
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
 from pytest_simbench.scene.robot import Closure, Coupling, Gripper, Joint, MotionLimits, Robot
-from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene
+from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene, Start
 from pytest_simbench.scene.trajectory import Trajectory
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     "SceneError",
     "Solid",
     "Sphere",
+    "Start",
     "Trajectory",
     "Vector3",
     "Wrench",

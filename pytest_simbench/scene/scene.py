@@ -30,7 +30,21 @@ OVERLAP_TOLERANCE = 1e-4
 """Bodies may overlap this deep at the start [m]: resting contacts are given to rounding."""
 
 
-Start = tuple[tuple[str, Pose], ...]
+@dataclass(frozen=True)
+class Start(Wire):
+    """Where a scene may start.
+
+    Attributes:
+        bodies: names of free bodies.
+        poses: of each, in the frame that its file gives it (`Compound.file_frame`).
+        positions: of the robot's joints [rad or m]; empty: as the scene has them.
+        targets: what its drives are told there; empty: the positions.
+    """
+
+    bodies: tuple[str, ...]
+    poses: tuple[Pose, ...]
+    positions: tuple[float, ...] = ()
+    targets: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -46,9 +60,8 @@ class Scene(Wire):
         room: how far it goes from the origin to each side in x and in y, and up [m]. A free body
             that leaves it has diverged (`plausibility`); 1e6 for a side without a wall.
         ground_restitution: Newton's coefficient of the ground plane, as `Body.restitution`.
-        starts: poses of free bodies, in the frames that a file gives them (`Compound.file_frame`),
-            for tasks that go through several; one tuple of names and poses each. Right after a file
-            was read they are its keyframes. A worker does not get them.
+        starts: for tasks that go through several. Right after a file was read they are its
+            keyframes. A worker does not get them.
         friction_rule: what the friction of two surfaces is, one of `friction.RULES`.
         apart: pairs that do not collide, each two of "ground", `body/NAME` and `link/NAME`; links
             are those of the reduced robot. Only for engines with the capability `apart`.
@@ -205,6 +218,20 @@ class Scene(Wire):
         """The same scene with one body replaced by its namesake."""
         self.body(body.name)
         return replace(self, bodies=tuple(body if b.name == body.name else b for b in self.bodies))
+
+    def at_start(self, start: Start) -> Scene:
+        """The same scene, which starts there."""
+        moved = {}
+        for name, pose in zip(start.bodies, start.poses, strict=True):
+            body = self.body(name)
+            moved[name] = body.moved_to(pose * getattr(body, "file_frame", Pose()).inverse())
+        robot = self.robot
+        if robot is not None and start.positions:
+            pairs = zip(robot.joints, start.positions, strict=True)
+            joints = tuple(replace(joint, initial_position=at) for joint, at in pairs)
+            robot = replace(robot, joints=joints)
+        bodies = tuple(moved.get(body.name, body) for body in self.bodies)
+        return replace(self, bodies=bodies, robot=robot)
 
     def with_pose(self, name: str, pose: Pose) -> Scene:
         return self.with_body(self.body(name).moved_to(pose))

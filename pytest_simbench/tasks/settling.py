@@ -125,8 +125,7 @@ class Settling(Task):
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         scene, rng = self.world, np.random.default_rng(seed)
         if scene.starts:
-            for name, pose in scene.starts[seed % len(scene.starts)]:
-                scene = scene.with_pose(name, pose * _file_frame(scene.body(name)).inverse())
+            scene = scene.at_start(scene.starts[seed % len(scene.starts)])
         if self.moved:
             for body in scene.free_bodies:
                 x, y = rng.uniform(-self.moved, self.moved, 2)

@@ -139,7 +139,7 @@ class Server:
 
     def do_read_file(self, path: str) -> dict[str, Any]:
         scene, account = self._constructed().read_file(path)
-        starts = [[(name, pose.as_array()) for name, pose in start] for start in scene.starts]
+        starts = [start.to_wire() for start in scene.starts]
         lines = [line.to_wire() for line in account]
         return {"scene": scene.to_wire(), "starts": starts, "account": lines}
 

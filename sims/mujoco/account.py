@@ -61,19 +61,6 @@ def _tell_shapes(reading: Reading) -> None:
     if seen := np.flatnonzero(~masks.any(axis=1)).tolist():
         names = (reading.name("geom", geom) for geom in seen)
         reading.tell("geom (visual)", NOT_CARRIED, "it cannot collide; its mass counts", names)
-    bodies = {link.body for link in reading.links}
-    on_joints = [g for g in reading.solid if reading.root_of(g) in bodies]
-    moving = [*(g for p in reading.placed if p.root for g in p.geoms), *on_joints]
-    others = [g for g in [*reading.solid, reading.ground] if g is not None]
-    meet = (masks[moving][:, None] & masks[others][:, ::-1]).any(axis=2)
-    links = np.isin(moving, on_joints)[:, None] & np.isin(others, on_joints)  # told by themselves
-    if not (meet | links).all():
-        reading.tell(
-            "geom contype, conaffinity",
-            NOT_CARRIED,
-            "some pairs do not collide in the file; here all bodies collide with each other: "
-            f"{values_of(masks[others])}",
-        )
 
 
 def _tell_options(reading: Reading) -> None:
@@ -134,8 +121,13 @@ def _tell_fields(
 
 
 def _tell_objects(reading: Reading) -> None:
+    tree = reading.tree
+    told = {
+        "nu": {int(k) for drive in tree.drives for k in drive.numbers},
+        "neq": set(range(reading.model.neq)) if reading.links else set(),
+    }
     for count, (kind, reason) in OBJECTS.items():
-        carried = reading.servos if kind == "actuator" else set()
+        carried = told.get(count, set())
         left = [k for k in range(int(getattr(reading.model, count, 0))) if k not in carried]
         if left:
             known = hasattr(reading.model, kind)

@@ -1,8 +1,7 @@
 """What moves on joints in a file, as one tree of links: a robot without a hand, fixed in the world.
 
 Cabinets, doors and arms of a file are branches of that tree, so every engine holds them as it holds
-any robot. A drive of each joint has the joint's damping, the spring's stiffness, and the gains of a
-position actuator; it holds the joint where it starts.
+any robot. The drive of a joint is what its actuators make of it.
 """
 
 from __future__ import annotations
@@ -23,6 +22,9 @@ from pytest_simbench.scene.pose import vector3
 from pytest_simbench.scene.robot import FARTHEST, FREE, WIDEST
 from pytest_simbench.simulator import lazy_import
 
+from .actuators import Drive, drive_of
+from .constraints import Constraints
+
 if TYPE_CHECKING:
     from .reading import Reading
 
@@ -30,9 +32,6 @@ mujoco = lazy_import("mujoco")
 
 MOUNT = "mount"
 """The link that is fixed in the world."""
-
-STRONG = 1e4
-"""Largest effort of a drive without a limit [N m or N]."""
 
 FASTEST = 1000.0
 """Largest speed of a joint, which a file does not limit [rad/s or m/s]."""
@@ -114,16 +113,18 @@ class Tree:
         links: of it, at least one.
 
     Attributes:
-        servos: numbers of the actuators that a drive stands for.
+        drives, limits: of the joints, in their order.
     """
 
     def __init__(self, reading: Reading, links: list[OnJoint]) -> None:
         self.reading, self.links, self.model = reading, links, reading.model
+        self._bodies = {link.body for link in links}
         self._meshes: dict[str, bytes] = {}
         self._coarse: dict[str, float] = {}
-        self.servos: set[int] = set()
+        self.drives: list[Drive] = []
+        self.limits: list[list[float]] = []
 
-    def robot(self, lift: float) -> Robot:
+    def robot(self, lift: float, self_collide: bool) -> Robot:
         """The robot, its mount at the file's origin, that height above the world's [m]."""
         root = ET.Element("robot", name="tree")
         ET.SubElement(root, "link", name=MOUNT)
@@ -137,13 +138,15 @@ class Tree:
             on = MOUNT if link.above is None else link.above.name
             moving = MovingJoint(link.told, kind, on, link.name, origin, axis)
             limits = self._limits(link, WIDEST if hinge else FARTHEST)
-            drive = self._drive(link, min(max(0.0, limits[0]), limits[1]))
+            self.limits.append(limits)
+            joint = self._joint(link, limits)
             write_link(root, self._link(link))
-            write_joint(root, moving, limits, drive.effort_limit, FASTEST)
-            joints.append(drive)
-        geoms = [g for link in self.links if link.whole for g in self._geoms(link)]
+            write_joint(root, moving, limits, joint.effort_limit, FASTEST)
+            joints.append(joint)
+        geoms = [g for link in self.links if link.whole for g in self.reading.geoms_of(link)]
         frictions = self.model.geom_friction[geoms, 0] if geoms else np.ones(1)
         self._tell(frictions)
+        constraints = Constraints(self)
         ET.indent(root)
         return Robot(
             name="tree",
@@ -155,10 +158,21 @@ class Tree:
             tool_frame=self.links[-1].name,
             base=Pose.at(0.0, 0.0, lift),
             friction=float(frictions.max()),
+            closures=tuple(constraints.closures),
+            self_collide=self_collide,
+            couplings=tuple(constraints.couplings),
         )
 
-    def _geoms(self, link: OnJoint) -> list[int]:
-        return [g for g in self.reading.solid if self.reading.root_of(g) == link.body]
+    def link_of(self, root: int) -> str | None:
+        """The link that a moving body of the file is (0: the mount); None: it is none."""
+        if not root:
+            return MOUNT
+        return next((k.name for k in self.links if k.body == root and k.whole), None)
+
+    def frame_of(self, name: str) -> Pose:
+        """Of the link of that name, in the file's world."""
+        found = (self._frame(link) for link in self.links if link.name == name)
+        return next(found, Pose())
 
     def _frame(self, link: OnJoint) -> Pose:
         """Of the link, at its joint, in the file's world."""
@@ -171,7 +185,7 @@ class Tree:
             mass, tensor = BETWEEN * mass + LEAST, BETWEEN * tensor + np.diag([LEAST] * 3)
             return Link(link.name, mass, centre - anchor, tensor)
         frame = self._frame(link).inverse()
-        geoms = [(g, frame * self.reading.geom_pose(g)) for g in self._geoms(link)]
+        geoms = [(g, frame * self.reading.geom_pose(g)) for g in self.reading.geoms_of(link)]
         shapes = [self._shape(geom, pose, link) for geom, pose in geoms]
         return Link(link.name, mass, centre - anchor, tensor, shapes)
 
@@ -218,59 +232,37 @@ class Tree:
         tell("joint range (none)", APPROXIMATED, reason, [link.told])
         return [-widest, widest]
 
-    def _drive(self, link: OnJoint, start: float) -> Joint:
-        model, tell, dof = self.model, self.reading.tell, int(self.model.jnt_dofadr[link.joint])
-        stiffness, damping, effort = 0.0, float(model.dof_damping[dof]), STRONG
-        spring = float(np.ravel(model.jnt_stiffness[link.joint])[0])
-        at = int(model.jnt_qposadr[link.joint])
-        if spring and np.isclose(model.qpos_spring[at], model.qpos0[at]):
-            stiffness += spring
-        elif spring:
-            reason = "a drive holds its joint where it starts, and this spring rests elsewhere"
-            tell("joint stiffness, springref", NOT_CARRIED, reason, [link.told])
-        servo = self._servo(link)
-        if servo is not None:
-            gain, rate, limit = servo
-            stiffness, damping, effort = stiffness + gain, damping + rate, min(limit, STRONG)
-            reason = f"it holds its joint where it starts, by at most {effort:g} N m or N"
-            tell("actuator (position)", APPROXIMATED, reason, [link.told])
-        if not stiffness and not damping:
-            effort = FREE
-        armature = float(model.dof_armature[dof])
-        return Joint(link.told, max(stiffness, FREE), damping, effort, armature, start)
-
-    def _servo(self, link: OnJoint) -> tuple[float, float, float] | None:
-        """Stiffness, damping and largest effort of a joint's one position actuator; None: it has
-        none of that kind."""
-        model = self.model
-        at_joint = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
-        own = np.flatnonzero(at_joint & (model.actuator_trnid[:, 0] == link.joint)).tolist()
-        if len(own) != 1:
-            return None
-        (k,) = own
-        gain, bias = float(model.actuator_gainprm[k, 0]), model.actuator_biasprm[k]
-        position = gain > 0 and bias[1] == -gain and not bias[0]
-        if not position or model.actuator_gear[k, 0] != 1 or model.actuator_dyntype[k]:
-            return None
-        self.servos.add(k)
-        limited = model.actuator_forcelimited[k]
-        limit = float(np.abs(model.actuator_forcerange[k]).min()) if limited else STRONG
-        return gain, float(-bias[2]), limit
+    def _joint(self, link: OnJoint, limits: list[float]) -> Joint:
+        model, joint = self.model, link.joint
+        dof, at = int(model.jnt_dofadr[joint]), int(model.jnt_qposadr[joint])
+        drive = drive_of(self.reading, joint)
+        self.drives.append(drive)
+        return Joint(
+            link.told,
+            max(drive.stiffness, FREE),
+            drive.damping,
+            drive.limit if drive.stiffness or drive.damping else FREE,
+            float(model.dof_armature[dof]),
+            min(max(0.0, limits[0]), limits[1]),
+            passive_damping=float(np.ravel(model.dof_damping[dof])[0]),
+            friction=float(model.dof_frictionloss[dof]),
+            spring=float(np.ravel(model.jnt_stiffness[joint])[0]),
+            rest=float(model.qpos_spring[at] - model.qpos0[at]),
+        )
 
     def _tell(self, frictions: FloatArray) -> None:
-        tell, model = self.reading.tell, self.model
+        tell = self.reading.tell
         names = [link.told for link in self.links]
-        tell("joint pos, axis, range, armature", CARRIED, f"{len(names)} hinges and sliders", names)
-        dofs = model.jnt_dofadr[[link.joint for link in self.links]]
-        if model.dof_damping[dofs].any():
-            reason = "as a drive's; an engine whose drives are no springs brakes such a joint"
-            tell("joint damping", APPROXIMATED, reason, names)
+        told = "joint pos, axis, range, armature, damping, frictionloss, stiffness, springref"
+        tell(told, CARRIED, f"{len(names)} hinges and sliders", names)
+        borne = [b for b in range(1, self.model.nbody) if self.reading.root(b) in self._bodies]
+        if self.model.body_gravcomp[borne].any():
+            reason = "every link of a scene has its whole weight"
+            names = [self.reading.name("body", b) for b in borne if self.model.body_gravcomp[b]]
+            tell("body gravcomp (of links)", NOT_CARRIED, reason, names)
         if frictions.min() < frictions.max():
             reason = f"links have one friction: the largest of {sorted(set(frictions.tolist()))}"
             tell("geom friction (sliding)", APPROXIMATED, reason)
-        if len(self.links) > 1:
-            reason = "links of a scene pass through each other"
-            tell("contacts of links with each other", NOT_CARRIED, reason)
         if self._coarse:
             gap = 1000 * max(self._coarse.values())
             reason = f"round shapes of links are hulls of corners, up to {gap:.2g} mm smaller"

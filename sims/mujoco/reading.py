@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.carried import APPROXIMATED, NOT_CARRIED, Carried, named
+from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
 from pytest_simbench.description.urdf import ROOT
 from pytest_simbench.scene import (
     Body,
@@ -27,16 +27,19 @@ from pytest_simbench.scene import (
     Scene,
     SceneError,
     Sphere,
+    Start,
+    Wrench,
     principal,
 )
 from pytest_simbench.scene.checks import FORBIDDEN, RESERVED
 from pytest_simbench.scene.polytope import MOST
 from pytest_simbench.scene.pose import quaternion_of, vector3
-from pytest_simbench.scene.scene import ROOM, Start
+from pytest_simbench.scene.scene import ROOM
 from pytest_simbench.simulator import DescriptionError, lazy_import
 
 from .account import tell_the_rest, values_of
-from .articulated import MOUNT, Tree, directions, on_joints
+from .articulated import MOUNT, OnJoint, Tree, directions, on_joints
+from .touching import apart
 
 mujoco = lazy_import("mujoco")
 
@@ -124,6 +127,10 @@ class Reading:
         root = int(self.model.body_weldid[body])
         return root if self.model.body_dofnum[root] else 0
 
+    def geoms_of(self, link: OnJoint) -> list[int]:
+        """The shapes of a link that collide."""
+        return [geom for geom in self.solid if self.root_of(geom) == link.body]
+
     def _find_ground(self) -> int | None:
         planes = [g for g in self.solid if self.model.geom_type[g] == mujoco.mjtGeom.mjGEOM_PLANE]
         for plane in planes:
@@ -185,6 +192,10 @@ class Reading:
         """Of a shape in the file's world."""
         return _pose(self.data.geom_xpos[geom], _quaternion(self.data.geom_xmat[geom]))
 
+    def site_pose(self, site: int) -> Pose:
+        """Of a site in the file's world."""
+        return _pose(self.data.site_xpos[site], _quaternion(self.data.site_xmat[site]))
+
     def _placed(self, name: str, root: int, geoms: list[int]) -> Placed:
         model = self.model
         base = self.pose(root)
@@ -218,7 +229,8 @@ class Reading:
                 body = shapes[0].changed(name=name, mass=mass)
                 if not np.allclose(np.diag(turned), body.even_inertia(), rtol=CLOSE, atol=0):
                     body = body.changed(moments=vector3(np.diag(turned)))
-                return Placed(self._damped(body, root, centre), root, geoms, shapes[0].pose)
+                body = self._borne(self._damped(body, root, centre), root)
+                return Placed(body, root, geoms, shapes[0].pose)
         moments, axes = np.linalg.eigh(tensor)
         axes[:, 0] *= np.sign(np.linalg.det(axes))
         frame = _pose(centre, quaternion_of(axes))
@@ -232,7 +244,8 @@ class Reading:
             moments=vector3(moments),
             file_frame=inverse,
         )
-        return Placed(self._damped(body, root, centre), root, geoms, frame)
+        body = self._borne(self._damped(body, root, centre), root)
+        return Placed(body, root, geoms, frame)
 
     def shape(self, geom: int, name: str, friction: float) -> tuple[Body, Pose]:
         """A shape, and its frame in that of its geom."""
@@ -310,6 +323,22 @@ class Reading:
             tensor += m * (away @ away * np.eye(3) - np.outer(away, away))
         return mass, centre, tensor
 
+    def _borne(self, body: Body, root: int) -> Body:
+        """With the force that compensates its gravity."""
+        model = self.model
+        own = [b for b in range(1, model.nbody) if self.root(b) == root]
+        shares = model.body_gravcomp[own]
+        if not shares.any():
+            return body
+        masses = model.body_mass[own]
+        even = np.ptp(shares[masses > 0]) < CLOSE
+        reason = f"a force of {float(shares @ masses / masses.sum()):.4g} of its weight bears it"
+        if not even:
+            reason += " at its centre of mass; in the file its parts are borne by different shares"
+        self.tell("body gravcomp", CARRIED if even else APPROXIMATED, reason, [body.name])
+        force = vector3(-float(shares @ masses) * model.opt.gravity)
+        return body.changed(wrenches=(Wrench(force=force),))
+
     def _damped(self, body: Body, root: int, centre: FloatArray) -> Body:
         """With the damping of its free joint."""
         first = int(self.model.body_dofadr[root])
@@ -348,33 +377,41 @@ class Reading:
         self.placed = [
             replace(p, body=p.body.moved_to(p.body.pose.translated(z=self.lift))) for p in moved
         ]
-        tree = Tree(self, self.links)
-        self.servos = tree.servos
+        pairs, together = apart(self)
+        self.tree = tree = Tree(self, self.links)
         free = [p.body.pose.position for p in self.placed if p.root]
         room = np.maximum(ROOM, 2 * np.abs(free).max(axis=0, initial=0.0) if free else 0.0)
         off = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
         self.scene = Scene(
             Path(self.path).stem.strip(" .") or "scene",
             tuple(p.body for p in self.placed),
-            tree.robot(self.lift) if self.links else None,
+            tree.robot(self.lift, together) if self.links else None,
             gravity=(0.0, 0.0, 0.0) if off else vector3(model.opt.gravity),
             ground_friction=friction,
             room=vector3(room),
+            apart=pairs,
             file=self.path,
-            starts=tuple(self._start(key) for key in model.key_qpos),
+            starts=tuple(map(self._start, range(model.nkey))),
             file_timestep=float(model.opt.timestep),
             file_lift=self.lift,
         )
 
-    def _start(self, qpos: FloatArray) -> Start:
-        """A keyframe's poses of the free bodies, in the frames of the file."""
-        found = []
+    def _start(self, key: int) -> Start:
+        """A keyframe: the free bodies' poses in the frames of the file, the joints' positions, and
+        what the controls tell their drives."""
+        model, qpos = self.model, self.model.key_qpos[key]
+        names, poses = [], []
         for p in self.placed:
             if p.root:
-                k = int(self.model.jnt_qposadr[self.model.body_jntadr[p.root]])
-                pose = _pose(qpos[k : k + 3], qpos[k + 3 : k + 7])
-                found.append((p.body.name, pose.translated(z=self.lift)))
-        return tuple(found)
+                k = int(model.jnt_qposadr[model.body_jntadr[p.root]])
+                names.append(p.body.name)
+                poses.append(_pose(qpos[k : k + 3], qpos[k + 3 : k + 7]).translated(z=self.lift))
+        at = model.jnt_qposadr[[link.joint for link in self.links]].astype(int)
+        limits = np.reshape(self.tree.limits, (-1, 2))
+        positions = np.clip(qpos[at] - model.qpos0[at], *limits.T).tolist()
+        held = [drive.target(model.key_ctrl[key]) for drive in self.tree.drives]
+        targets = [q if t is None else t for q, t in zip(positions, held, strict=True)]
+        return Start(tuple(names), tuple(poses), tuple(positions), tuple(targets))
 
 
 def _pose(place: Any, quaternion: Any) -> Pose:

@@ -50,7 +50,6 @@ TOLD: dict[str, tuple[str, str, bool]] = {
     "geom_fluid": ("geom fluidshape, fluidcoef", AIR, False),
     "geom_adhesion": ("geom adhesion", "surfaces of a scene do not stick", False),
     "geom_surfacevel": ("geom surfacevel", "surfaces of a scene do not run like belts", False),
-    "body_gravcomp": ("body gravcomp", "every body of a scene has its whole weight", False),
     "body_mocapid": ("body mocap", "it is a fixed body: nothing moves it", False),
     "dof_armature": ("joint armature (free)", "a free body has the inertia of its mass", False),
     "dof_frictionloss": ("joint frictionloss (free)", "nothing holds a free body back", False),
@@ -66,8 +65,8 @@ LIMITS = (
     False,
 )
 FRICTION = (
-    "joint frictionloss",
-    "drives have no friction: what stays where it is pushed in the file may creep, swing or fall",
+    "joint solreffriction, solimpfriction",
+    "friction of joints is as hard as an engine has it",
     False,
 )
 
@@ -75,14 +74,15 @@ TOLD_ON_JOINTS: dict[str, tuple[str, str, bool]] = {
     "jnt_margin": ("joint margin", "a range ends at its end, not before it", False),
     "jnt_solref": LIMITS,
     "jnt_solimp": LIMITS,
-    "dof_frictionloss": FRICTION,
     "dof_solref": FRICTION,
     "dof_solimp": FRICTION,
     "dof_dampingpoly": TOLD["dof_dampingpoly"],
 }
 """The same of hinges and sliders."""
 
-HELD_BY_DRIVES = frozenset(("jnt_limited", "jnt_range", "jnt_stiffness", "dof_armature"))
+HELD_BY_DRIVES = frozenset(
+    ("jnt_limited", "jnt_range", "jnt_stiffness", "dof_armature", "dof_frictionloss")
+)
 """Fields of hinges and sliders that the drives and links of a scene carry."""
 
 DERIVED = frozenset(
@@ -90,7 +90,7 @@ DERIVED = frozenset(
     for kind, names in {
         "geom": "aabb bodyid castshadow conaffinity contype dataid group matid pos quat rbound "
         "rgba sameframe size type user",
-        "body": "bvhadr bvhnum conaffinity contype dofadr dofnum geomadr geomnum inertia "
+        "body": "bvhadr bvhnum conaffinity contype dofadr dofnum geomadr geomnum gravcomp inertia "
         "invweight0 ipos iquat jntadr jntnum margin mass parentid pos quat rootid sameframe "
         "simple subtreemass treeid user weldid",
         "jnt": "actuatorid axis bodyid dofadr group plasticadr pos qposadr type user",
@@ -108,12 +108,8 @@ OBJECTS = {
     "neq": ("equality", HELD),
     "nflex": ("flex", "soft bodies are left out"),
     "nplugin": ("plugin", HELD),
-    "nkey": (
-        "key",
-        "tests may take its poses as starts; its velocities and controls are not read",
-    ),
+    "nkey": ("key", "tests may take it as a start; its velocities are not read"),
     "nsensor": ("sensor", "nothing reads it"),
     "npair": ("pair", "pairs have the friction of their surfaces"),
-    "nexclude": ("exclude", "the two bodies collide in the scene"),
 }
 """By the model's count of them: what they are called, and what that they are left out means."""

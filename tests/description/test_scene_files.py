@@ -132,7 +132,7 @@ def test_equal_starts_elsewhere_on_the_table_are_one(tmp_path: Path) -> None:
     b = rows((0, 0, 2), (0.5, 0, 2), (0, 0.1, 2))
     np.savez(tmp_path / "starts.npz", a=a, b=b)
     starts = read_starts(tmp_path / "starts.npz", SCENE)
-    assert [dict(start)["b"].position for start in starts] == [(0, 0, 2), (0.5, 0, 2), (0, 0.1, 2)]
+    assert [start.poses[1].position for start in starts] == [(0, 0, 2), (0.5, 0, 2), (0, 0.1, 2)]
     assert distinct(starts) == 2
     assert distinct(starts[:2]) == 1
 

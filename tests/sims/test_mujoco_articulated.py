@@ -106,7 +106,10 @@ def test_limits_drives_and_the_rest_of_the_scene(kitchen: Path) -> None:
     assert limits["slide"] == pytest.approx([0, 0.25])
     assert limits["shoulder"] == pytest.approx(np.radians([-90, 120]))
     elbow = scene.robot.joints[scene.robot.joint_names.index("elbow")]
-    assert (elbow.stiffness, elbow.damping, elbow.effort_limit) == (23.0, 2.0, 8.0)
+    assert (elbow.stiffness, elbow.damping, elbow.effort_limit) == (20.0, 2.0, 8.0)
+    assert (elbow.spring, elbow.rest, scene.robot.joints[0].passive_damping) == (3.0, 0.0, 2.0)
+    assert scene.robot.self_collide
+    assert scene.apart == (("link/arm", "link/hand"),)  # parent and child
     assert [body.name for body in scene.bodies] == ["cabinet", "ball"]
 
 
@@ -144,13 +147,92 @@ def test_nothing_of_a_joint_is_dropped_in_silence(kitchen: Path, old: str, new: 
     assert before.scene != after.scene or before.account != after.account
 
 
-def test_masks_between_links_and_the_rest_are_told(kitchen: Path) -> None:
+def test_masks_between_links_and_the_rest_keep_them_apart(kitchen: Path) -> None:
     """The floor meets the ball, and no link."""
-    masks = "geom contype, conaffinity"
-    assert masks not in {line.quantity for line in Reading(str(kitchen)).account}
     text = KITCHEN.replace('mass=".2"', 'mass=".2" contype="3" conaffinity="3"')
     kitchen.write_text(text.replace('name="floor"', 'name="floor" contype="2" conaffinity="2"'))
-    assert masks in {line.quantity for line in Reading(str(kitchen)).account}
+    scene = Reading(str(kitchen)).scene
+    assert all(scene.kept_apart("ground", f"link/{name}") for name in ("drawer", "arm", "hand"))
+    assert not scene.kept_apart("ground", "body/ball")
+    assert not scene.kept_apart("link/drawer", "body/ball")
+
+
+EQUALITY = "</worldbody><equality>{}</equality>"
+WELD = '<weld body1="arm" body2="drawer" solref="2e-4 1"/>'
+CONNECT = '<connect body1="hand" body2="cabinet" anchor="0 .1 .1" solref="2e-4 1"/>'
+GEARS = '<joint joint1="slide" joint2="shoulder" polycoef="0 .3 0 0 0" solref="2e-4 1"/>'
+
+
+@pytest.mark.parametrize(
+    ("held", "closures", "couplings"),
+    [(WELD, 3, 0), (CONNECT, 1, 0), (GEARS, 0, 1), (WELD + GEARS, 3, 1)],
+)
+def test_constraints_move_links_as_in_the_file(
+    kitchen: Path, held: str, closures: int, couplings: int
+) -> None:
+    """A tenth of a second in steps of 0.1 ms, as hard in the file as in the scene."""
+    reading = changed(kitchen, "</worldbody>", EQUALITY.format(held))
+    assert reading.scene.robot is not None
+    assert len(reading.scene.robot.closures) == closures
+    assert len(reading.scene.robot.couplings) == couplings
+    found = {}
+    for profile in ("default", "file"):
+        simulator = MuJoCo(with_changes(MuJoCo.profiles[profile], {"timestep": 1e-4}, "mujoco"))
+        simulator.load(reading.scene)
+        for _ in range(1000):
+            simulator.step()
+        found[profile] = simulator.joint_state()
+        simulator.close()
+    free = moved(kitchen)
+    assert np.abs(found["file"][0] - free).max() > 0.01
+    assert found["default"][0] == pytest.approx(found["file"][0], rel=0.01, abs=2e-4)
+
+
+def moved(path: Path) -> np.ndarray:
+    """Positions of the joints after a tenth of a second without constraints."""
+    path.write_text(KITCHEN)
+    simulator = MuJoCo(with_changes(MuJoCo.profiles["file"], {"timestep": 1e-4}, "mujoco"))
+    simulator.load(Reading(str(path)).scene)
+    for _ in range(1000):
+        simulator.step()
+    found = simulator.joint_state()[0]
+    simulator.close()
+    return found
+
+
+@pytest.mark.parametrize(
+    ("held", "why"),
+    [
+        ('<weld body1="ball" body2="drawer"/>', "moves freely"),
+        ('<weld body1="arm" body2="drawer" relpose="0 0 1 1 0 0 0"/>', "is open by"),
+        ('<joint joint1="slide" polycoef=".1 0 0 0 0"/>', "two hinges or sliders"),
+        ('<joint joint1="slide" joint2="elbow" polycoef="0 0 1 0 0"/>', "polynomial"),
+        ('<joint joint1="slide" joint2="elbow" polycoef=".1 1 0 0 0"/>', "where the file starts"),
+        (GEARS.replace("<joint", '<joint active="false"'), "switched off"),
+    ],
+)
+def test_constraints_that_are_not_carried_say_why(kitchen: Path, held: str, why: str) -> None:
+    reading = changed(kitchen, "</worldbody>", EQUALITY.format(held))
+    assert reading.scene.robot is not None
+    assert not reading.scene.robot.closures + reading.scene.robot.couplings
+    told = {line.quantity: line.reason for line in reading.account if line.state == "not carried"}
+    (reason,) = (text for name, text in told.items() if name.startswith("equality"))
+    assert why in reason
+
+
+def test_several_actuators_of_a_joint_are_one_drive(kitchen: Path) -> None:
+    two = '<position joint="slide" kp="50" gear="2"/><velocity joint="slide" kv="3"/><position name'
+    joint = changed(kitchen, "<position name", two).scene.robot.joints[0]
+    assert (joint.stiffness, joint.damping, joint.passive_damping) == (200.0, 3.0, 2.0)
+
+
+def test_a_keyframe_has_joints_and_what_their_drives_are_told(kitchen: Path) -> None:
+    pose = "0 0 .5 1 0 0 0"
+    key = f'</actuator><keyframe><key qpos=".1 2 -.3 {pose}" ctrl=".4"/></keyframe>'
+    (start,) = changed(kitchen, "</actuator>", key).scene.starts
+    assert start.positions == pytest.approx((0.1, 2.0, -0.3))
+    assert start.targets == pytest.approx((0.1, 2.0, 0.4))
+    assert start.poses[0].position == (0.0, 0.0, 0.5)
 
 
 @pytest.mark.parametrize(

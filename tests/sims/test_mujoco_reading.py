@@ -197,12 +197,10 @@ TOLD = {
         "</worldbody>",
         '</worldbody><equality><weld body1="box" body2="ball"/></equality>',
     ),
-    "exclude": SMALL.replace(
-        "</worldbody>",
-        '</worldbody><contact><exclude body1="box" body2="ball"/></contact>',
-    ),
     "key": SMALL.replace("</worldbody>", '</worldbody><keyframe><key name="k"/></keyframe>'),
-    "geom contype, conaffinity": SMALL.replace('name="g"', 'contype="2" conaffinity="4"'),
+    "geom contype, conaffinity (of single shapes)": SMALL.replace(
+        'density="3000"', 'contype="2" conaffinity="2"'
+    ),
     "geom (visual)": SMALL.replace(
         '<geom name="g"', '<geom type="sphere" size=".1" contype="0" conaffinity="0"/><geom'
     ),
@@ -216,6 +214,35 @@ def test_what_is_not_carried_is_told(tmp_path: Path, quantity: str, text: str) -
     told = {line.quantity for line in read(tmp_path, text).account if line.state != "carried"}
     before = {line.quantity for line in read(tmp_path).account if line.state != "carried"}
     assert quantity in told - before
+
+
+EXCLUDED = "</worldbody><contact><exclude body1='box' body2='ball'/></contact>"
+ALONE = [(name, "box") for name in ("post", "ball", "rock", "tool", "ground")]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "pairs"),
+    [
+        ("</worldbody>", EXCLUDED, [("ball", "box")]),
+        ('name="g"', 'name="g" contype="2" conaffinity="4"', ALONE),
+        ('name="floor"', 'name="floor" contype="2"', []),
+        ('name="floor"', 'name="floor" contype="4" conaffinity="2"',
+         [("ground", name) for name in ("box", "ball", "rock", "tool")]),
+    ],
+)  # fmt: skip
+def test_what_masks_and_exclusions_keep_apart(
+    tmp_path: Path, old: str, new: str, pairs: list[tuple[str, str]]
+) -> None:
+    apart = read(tmp_path, SMALL.replace(old, new)).scene.apart
+    found = {frozenset(name.removeprefix("body/") for name in pair) for pair in apart}
+    assert found == set(map(frozenset, pairs))
+
+
+@pytest.mark.parametrize("share", [1.0, 0.25])
+def test_compensated_gravity_is_a_force(tmp_path: Path, share: float) -> None:
+    text = SMALL.replace('name="box"', f'name="box" gravcomp="{share}"')
+    body = read(tmp_path, text).scene.body("box")
+    assert body.wrenches[0].force == pytest.approx((0, 0, 9.81 * share * body.mass))
 
 
 NO_PHYSICS = {
@@ -236,7 +263,7 @@ text of the file is to be read; lists of children and objects."""
 
 VALUES: dict[str, Any] = {
     "geom.type": 3, "geom.fromto": None, "geom.meshname": None, "geom.condim": 4,
-    "geom.contype": 2, "geom.conaffinity": 2, "geom.typeinertia": 1, "geom.mass": 3.0,
+    "geom.contype": None, "geom.conaffinity": None, "geom.typeinertia": 1, "geom.mass": 3.0,
     "geom.fluid_ellipsoid": 1.0, "geom.fluid_coefs": None, "geom.fitscale": None,
     "geom.solmix": 2.0, "geom.solref": [0.05, 1.0], "geom.solimp": [0.8, 0.9, 0.01, 0.5, 2.0],
     "body.explicitinertial": None, "body.fullinertia": None, "body.inertia": None,
@@ -255,6 +282,8 @@ TOGETHER: dict[str, Any] = {
     "geom.fluid_coefs": lambda s: setattr_(
         s.geom("g"), fluid_ellipsoid=1.0, fluid_coefs=[0.1] * 5
     ),
+    "geom.contype": lambda s: setattr_(s.geom("g"), contype=2, conaffinity=2),
+    "geom.conaffinity": lambda s: setattr_(s.geom("g"), contype=2, conaffinity=2),
     "body.mass": lambda s: inertial(s),
     "body.inertia": lambda s: inertial(s, inertia=[0.02, 0.02, 0.03]),
     "body.ipos": lambda s: inertial(s, ipos=[0.01, 0, 0]),

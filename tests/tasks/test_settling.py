@@ -13,7 +13,7 @@ import pytest
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.scene import Box, Compound, Pose, Scene, SceneError
+from pytest_simbench.scene import Box, Compound, Pose, Scene, SceneError, Start
 from pytest_simbench.tasks import Jitter, Settling, rests_on
 from pytest_simbench.tasks.settling import deepest, tilted
 from tests.conftest import case_of
@@ -55,7 +55,7 @@ def test_starts_are_moved_on_request_alone_and_by_the_seed() -> None:
 
 
 def test_repetitions_go_through_starts_which_are_in_the_file_s_frames() -> None:
-    starts = tuple((("stool", Pose.at(0.1 * k, 0, 0.2)),) for k in range(3))
+    starts = tuple(Start(("stool",), (Pose.at(0.1 * k, 0, 0.2),)) for k in range(3))
     task = Settling(replace(SCENE, starts=starts))
     for seed in range(6):
         pose = task.scene(seed, NONE).body("stool").pose * FRAME

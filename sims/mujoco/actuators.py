@@ -1,0 +1,103 @@
+"""What the actuators of a file's joint do, as one drive of the scene.
+
+A plain actuator on a joint pulls with gear (gain u + b0 + b1 gear q + b2 gear v), u its control. So
+several of them are one spring and damper again. Without a command a drive holds its joint where it
+starts, and a motor does nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pytest_simbench.description.carried import APPROXIMATED, NOT_CARRIED
+from pytest_simbench.scene import FloatArray
+from pytest_simbench.simulator import lazy_import
+
+if TYPE_CHECKING:
+    from .reading import Reading
+
+mujoco = lazy_import("mujoco")
+
+STRONG = 1e4
+"""Largest effort of a drive without a limit [N m or N]."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The plain actuators of a joint together.
+
+    Attributes:
+        numbers: of the actuators, (n,).
+        gears, gains, constants: of each, (n,).
+        zero: position of the joint in which the file is written [rad or m].
+        stiffness: [N m/rad, N/m].
+        damping: [N m s/rad, N s/m].
+        limit: largest effort, `STRONG` without one [N m, N].
+    """
+
+    numbers: FloatArray
+    gears: FloatArray
+    gains: FloatArray
+    constants: FloatArray
+    zero: float
+    stiffness: float
+    damping: float
+    limit: float
+
+    def target(self, controls: FloatArray) -> float | None:
+        """Where it holds the joint, from where the file is written, with the controls of a
+        keyframe, (nu,) [rad or m]; None: it holds it nowhere."""
+        if not self.stiffness:
+            return None
+        pull = self.gears @ (self.gains * controls[self.numbers] + self.constants)
+        return float(pull / self.stiffness) - self.zero
+
+    def controls(self, target: float) -> FloatArray:
+        """The controls, (n,), with which it holds the joint there, from where the file is written
+        [rad or m]; all alike in joint position."""
+        pull = self.stiffness * (target + self.zero) - self.gears @ self.constants
+        return np.asarray(pull * self.gains * self.gears / np.sum((self.gains * self.gears) ** 2))
+
+
+def drive_of(reading: Reading, joint: int) -> Drive:
+    """The drive of a joint; told is what it holds, and which actuators are left out."""
+    model, kinds = reading.model, mujoco
+    on_joint = model.actuator_trntype == kinds.mjtTrn.mjTRN_JOINT
+    own = np.flatnonzero(on_joint & (model.actuator_trnid[:, 0] == joint))
+    plain = np.array([k for k in own if _plain(model, int(k))], dtype=int)
+    gears, gains = model.actuator_gear[plain, 0], model.actuator_gainprm[plain, 0]
+    affine = (model.actuator_biastype[plain] == kinds.mjtBias.mjBIAS_AFFINE)[:, None]
+    constants, springs, dampers = np.where(affine, model.actuator_biasprm[plain, :3], 0.0).T
+    stiffness, damping = 0.0 - float(springs @ gears**2), 0.0 - float(dampers @ gears**2)
+    if stiffness < 0 or damping < 0 or (stiffness and not np.any(gains * gears)):
+        plain = plain[:0]  # what drives a joint away from where it is, or cannot be commanded
+        gears, gains, constants, stiffness, damping = plain, plain, plain, 0.0, 0.0
+    limited = model.actuator_forcelimited[plain].astype(bool)
+    ranges = np.abs(model.actuator_forcerange[plain]).min(axis=1) * np.abs(gears)
+    limit = float(ranges.sum()) if len(plain) and limited.all() else STRONG
+    zero = float(model.qpos0[model.jnt_qposadr[joint]])
+    made = Drive(plain, gears, gains, constants, zero, stiffness, damping, min(limit, STRONG))
+    names = [reading.name("actuator", int(k)) for k in plain]
+    if stiffness:
+        reason = f"it holds its joint where it starts, by at most {made.limit:g} N m or N"
+        reading.tell("actuator (position)", APPROXIMATED, reason, names)
+    elif damping:
+        reason = f"it holds its joint at rest, by at most {made.limit:g} N m or N"
+        reading.tell("actuator (velocity)", APPROXIMATED, reason, names)
+    elif names:
+        reason = "nothing commands it here; without a command it does nothing in the file, either"
+        reading.tell("actuator (motor)", NOT_CARRIED, reason, names)
+    return made
+
+
+def _plain(model: Any, number: int) -> bool:
+    """Whether an actuator's effort is affine in control, position and velocity."""
+    biases = (mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE)
+    return bool(
+        model.actuator_dyntype[number] == mujoco.mjtDyn.mjDYN_NONE
+        and model.actuator_gaintype[number] == mujoco.mjtGain.mjGAIN_FIXED
+        and any(model.actuator_biastype[number] == bias for bias in biases)
+    )

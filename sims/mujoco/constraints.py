@@ -1,0 +1,127 @@
+"""A file's equality constraints between links: points held together, and joints that move together.
+
+A weld is three points that are held together, not on one line: then nothing turns.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED
+from pytest_simbench.scene import Closure, Coupling, FloatArray, Pose
+from pytest_simbench.scene.pose import vector3
+from pytest_simbench.simulator import lazy_import
+
+if TYPE_CHECKING:
+    from .articulated import Tree
+
+mujoco = lazy_import("mujoco")
+
+WIDE = 0.1
+"""Distance of a weld's second and third point from its first [m]."""
+
+OPEN = 1e-6
+"""What is held together may be apart by this where the file starts [m; rad]."""
+
+
+class Constraints:
+    """Those of a tree of links; told is what became of each.
+
+    Attributes:
+        closures, couplings: of the robot.
+        carried: numbers of the constraints that they stand for.
+    """
+
+    def __init__(self, tree: Tree) -> None:
+        self.tree, self.reading, self.model = tree, tree.reading, tree.model
+        self.closures: list[Closure] = []
+        self.couplings: list[Coupling] = []
+        self.carried: set[int] = set()
+        kinds = mujoco.mjtEq
+        for k in range(self.model.neq):
+            kind = kinds(self.model.eq_type[k])
+            if not self.model.eq_active0[k]:
+                reason = "it is switched off in the file, and left out here"
+                self.reading.tell("equality active", NOT_CARRIED, reason, [self._name(k)])
+            elif kind == kinds.mjEQ_JOINT:
+                self._couple(k)
+            elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+                self._hold(k, kind == kinds.mjEQ_WELD)
+        if self.carried:
+            reason = "it is as stiff as an engine has it"
+            names = [self._name(k) for k in sorted(self.carried)]
+            self.reading.tell("equality solref, solimp, torquescale", APPROXIMATED, reason, names)
+
+    def _name(self, number: int) -> str:
+        return self.reading.name("equality", number)
+
+    def _tell(self, number: int, kind: str, problem: str) -> None:
+        """What became of a constraint; without a problem it is carried."""
+        state = NOT_CARRIED if problem else CARRIED
+        if not problem:
+            self.carried.add(number)
+        self.reading.tell(f"equality ({kind})", state, problem, [self._name(number)])
+
+    def _couple(self, k: int) -> None:
+        model, joints = self.model, {link.joint: link.told for link in self.tree.links}
+        follower, leader = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+        offset, ratio, *higher = model.eq_data[k, :5].tolist()
+        problem = ""
+        if follower not in joints or leader not in joints:
+            problem = "only two hinges or sliders move together here"
+        elif any(higher):
+            problem = "joints move together here in proportion, and not by a polynomial"
+        elif abs(offset) > OPEN:
+            problem = f"where the file starts, the joints are {offset:g} rad or m from where it is"
+        else:
+            self.couplings.append(Coupling(joints[follower], joints[leader], ratio, offset))
+        self._tell(k, "joint", problem)
+
+    def _hold(self, k: int, weld: bool) -> None:
+        ends = self._ends(k)
+        kind = "weld" if weld else "connect"
+        if ends is None:
+            self._tell(k, kind, "it holds a body that moves freely, and only links are held here")
+            return
+        first, second, anchor, gap = ends
+        if gap > OPEN:
+            self._tell(k, kind, f"where the file starts, it is open by {gap:.3g} m or rad")
+            return
+        aside = ([0.0, 0.0, 0.0], [WIDE, 0.0, 0.0], [0.0, WIDE, 0.0])[: 3 if weld else 1]
+        if first != second:
+            frames = [self.tree.frame_of(name).inverse() for name in (first, second)]
+            for way in aside:
+                point = Pose(vector3(anchor + np.array(way)))
+                places = [(frame * point).position for frame in frames]
+                self.closures.append(Closure(first, second, places[0], places[1]))
+        self._tell(k, kind, "")
+
+    def _ends(self, k: int) -> tuple[str, str, FloatArray, float] | None:
+        """Both links, a point of the constraint in the file's world [m], and how far it is open
+        where the file starts [m or rad]; None: one end moves freely."""
+        model, reading = self.model, self.reading
+        objects = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+        data, weld = model.eq_data[k], model.eq_type[k] == mujoco.mjtEq.mjEQ_WELD
+        at_sites = model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_SITE
+        bodies = [int(model.site_bodyid[o]) if at_sites else o for o in objects]
+        names = [self.tree.link_of(reading.root(body)) for body in bodies]
+        if names[0] is None or names[1] is None:
+            return None
+        frames = [reading.site_pose(o) if at_sites else reading.pose(o) for o in objects]
+        if at_sites:
+            turned = frames[0].inverse() * frames[1] if weld else Pose()
+            points = [np.asarray(frame.position) for frame in frames]
+        elif weld:
+            relative = Pose.from_array([*data[3:6], *data[6:10]])  # of the second in the first
+            turned = (frames[0] * relative).inverse() * frames[1]
+            points = [np.asarray((frames[0] * relative).position), np.asarray(frames[1].position)]
+        else:
+            turned = Pose()
+            local = (data[:3], data[3:6])
+            places = [f * Pose(vector3(p)) for f, p in zip(frames, local, strict=True)]
+            points = [np.asarray(place.position) for place in places]
+        angle = 2 * float(np.linalg.norm(turned.quaternion[1:]))
+        gap = max(float(np.linalg.norm(points[1] - points[0])), angle)
+        return names[0], names[1], points[0], gap
