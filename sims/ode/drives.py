@@ -9,7 +9,8 @@ bounded by FMax. What it does follows from Vel and CFM:
 - `velocity`: Vel = P (q* - q), what Webots does with its motors; CFM is the world's.
 - at a stop ODE does not put the motor into the solver: it pushes with all of FMax, whatever Vel is.
   A drawer of 1.4 kg that begins at its stop left with 15 m/s, of a motor that brakes with at most
-  10 kN. So at a stop FMax is, for that step, what the law asks for, of joints that are no fingers.
+  10 kN. So at a stop FMax is, for that step, what the law asks for, of joints that are neither
+  fingers nor coupled.
 - a rotor of inertia J: with Vel the present velocity and CFM = h / J the effort is that which
   accelerates it, -J dv / h, and FMax has no limit. It is a motor of its own beside the drive's.
 - so are a joint's own spring and damping, by the drive law without a limit, and its dry friction:
@@ -167,10 +168,10 @@ class Drives:
             for joint in robot.joints
             if joint.passive_damping or joint.spring or joint.friction
         }
-        fingers += [axis for pinion in self.pinions.values() for axis in pinion.joints]
+        coupled = {*fingers, *(a for pinion in self.pinions.values() for a in pinion.joints)}
         self._motors = []
         for axis, gain, soft in zip(self.axes, self._shares[0], softness, strict=True):
-            eased = soft is not None and axis not in fingers and not axis.wide
+            eased = soft is not None and axis not in coupled and not axis.wide
             stops = [axis.joint.getParam(end) for end in (LO_STOP, HI_STOP)]
             stops = stops if eased else [-np.inf, np.inf]
             self._motors.append((axis, axis.joint.setParam, axis.angle, float(gain), *stops))
