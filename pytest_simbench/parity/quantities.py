@@ -91,6 +91,9 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
     for pattern, value in settings.quantities().items():
         meant = {name for name in quantities if fnmatchcase(name, pattern)}
         quantities |= dict.fromkeys(meant - own, value)
+    for joint in () if prepared is None else prepared.robot.joints:  # beside what settings say
+        quantities[f"joint/{joint.name}/stiffness"] += joint.spring
+        quantities[f"joint/{joint.name}/damping"] += joint.passive_damping
     return quantities
 
 
@@ -126,8 +129,8 @@ def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
             axis=axes[joint.name],
             limits=prepared.limits[joint.name],
             effort_limit=joint.effort_limit,
-            stiffness=joint.stiffness + joint.spring,
-            damping=joint.damping + joint.passive_damping,
+            stiffness=joint.stiffness,
+            damping=joint.damping,
             friction=joint.friction,
             armature=joint.armature,
             initial_position=joint.initial_position,

@@ -79,10 +79,11 @@ def planted_faults_are_seen(subject: Subject) -> None:
     """
     missed = []
     robot, capabilities = subject.robot, subject.cls.info.capabilities
+    lacking = [deviation for deviation in subject.cls.info.deviations if deviation.only]
     for faults in [robot_faults(robot)] if robot else rounds(capabilities):
         found = planted(subject, faults.values())
         for name, fault in faults.items():
-            if any(fault.word and fault.word == d.only for d in subject.cls.info.deviations):
+            if any(fault.word == d.only and d.within is None for d in lacking):
                 continue
             if fault.quantity not in found.wrong and fault.quantity not in found.untold:
                 missed.append(f"{name} ({fault.what}): {fault.quantity} equals the true scene's")
@@ -99,6 +100,6 @@ def planted(subject: Subject, faults: Iterable[Fault]) -> ParityResult:
     return compare(
         expected_quantities(truth, subject.settings),
         reported,
-        subject.cls.info.deviations,
+        [deviation for deviation in subject.cls.info.deviations if deviation.concerns(truth)],
         subject.name,
     )
