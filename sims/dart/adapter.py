@@ -39,6 +39,9 @@ dartpy = lazy_import("dartpy")
 State = tuple[float, list[tuple[FloatArray, FloatArray, FloatArray]], FloatArray]
 """Time, positions, velocities and accelerations of each skeleton, the command."""
 
+STRONGEST = 1e5
+"""Largest effort of a coupling [N m or N]; of one without limit DART makes 800."""
+
 
 class DART(Simulator):
     """Adapter of DART."""
@@ -56,8 +59,8 @@ class DART(Simulator):
         oldest_version="6.20.0",  # older ones have neither the detector nor the solver of `tuned`
         friction_rule="minimum",
         capabilities=Capability.named(
-            "window save_restore contact_count contact_forces compound loops self_collide "
-            "joint_wrenches deterministic"
+            "window save_restore contact_count contact_forces compound loops couplings apart "
+            "self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("joint/*/armature", "DART has no rotor inertia"),
@@ -86,10 +89,14 @@ class DART(Simulator):
             ),
             Deviation(
                 f"joint/{FOLLOWER}/effort_limit",
-                "a finger that follows has no drive: the first one moves it, by up to both limits",
+                "a joint that follows has no drive: the other one moves it, a finger by up to both "
+                "limits",
             ),
             Deviation(
-                "", "the coupling is one-way: the first finger does not feel the second's load"
+                "coupling/*", "dartpy does not tell what a joint follows how", only="coupling"
+            ),
+            Deviation(
+                "", "the fingers' coupling is one-way: the first does not feel the second's load"
             ),
         ),
         install_size_mb=80,
@@ -111,6 +118,9 @@ class DART(Simulator):
         self._base = np.empty(0)
         if self.prepared is not None:
             self._load_robot(self.prepared)
+        kept = self.world.getConstraintSolver().getCollisionOption().collisionFilter
+        for pair in scene.apart:
+            kept.addBodyNodePairToBlackList(*map(self._body_node, pair))
         self._viewer = self._open_window() if self.gui else None
 
     def _set_options(self, world: Any, scene: Scene) -> None:
@@ -151,15 +161,23 @@ class DART(Simulator):
             for shape in body.getShapeNodes():
                 if shape.hasCollisionAspect():
                     set_surface(shape, robot.friction)
-        followers = robot.gripper.joints[1:]
+        coupled = [pair.follower for pair in robot.couplings]
+        followers = [*robot.gripper.joints[1:], *coupled]
         for drive in robot.joints:
             joint = skeleton.getJoint(drive.name)
             joint.setLimitEnforcement(True)
             limit = drive.effort_limit
-            if drive.name in followers:
+            if drive.name in coupled:
+                joint.setUseCouplerConstraint(True)  # which both joints feel
+                limit = STRONGEST
+            elif drive.name in followers:
                 limit *= 2
             else:
                 joint.setActuatorType(dynamics.ActuatorType.SERVO)
+            joint.setDampingCoefficient(0, drive.passive_damping)
+            joint.setCoulombFriction(0, drive.friction)
+            joint.setSpringStiffness(0, drive.spring)
+            joint.setRestPosition(0, drive.rest)
             joint.setForceUpperLimit(0, limit)
             joint.setForceLowerLimit(0, -limit)
             # a servo keeps its velocity limit; the scene's drive law has none, no other engine does
@@ -256,6 +274,13 @@ class DART(Simulator):
             )
             force = np.asarray(contact.force)
             yield first, second, np.concatenate([force, np.cross(contact.point, force)])
+
+    def _body_node(self, name: str) -> Any:
+        """Of "ground", `body/NAME` or `link/NAME`."""
+        kind, _, rest = name.partition("/")
+        if kind == "link":
+            return self._robot.getBodyNode(rest)
+        return self._bodies[rest] if rest else self._ground
 
     def _name_of(self, body: Any) -> str:
         owner = body.getSkeleton().getName()
