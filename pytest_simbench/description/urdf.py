@@ -186,21 +186,19 @@ class PreparedRobot:
         """The reduced robot as URDF text.
 
         Args:
-            mimic: say which joints follow which.
+            mimic: say that the other fingers follow the first.
             visuals: draw each collision shape.
         """
-        root, robot = ET.Element("robot", name=self.robot.name), self.robot
+        root = ET.Element("robot", name=self.robot.name)
         for link in self.links.values():
             write_link(root, link, visuals)
-        couplings = (*robot.gripper.couplings, *robot.couplings) if mimic else ()
         for joint in self.joints:
-            drive = robot.joints[robot.joint_names.index(joint.name)]
+            drive = self.robot.joints[self.robot.joint_names.index(joint.name)]
             fastest = self.velocity_limits[joint.name]
             element = write_joint(root, joint, self.limits[joint.name], drive.effort_limit, fastest)
-            for pair in couplings:
-                if pair.follower == joint.name:
-                    follows = {"multiplier": repr(pair.ratio), "offset": repr(pair.offset)}
-                    ET.SubElement(element, "mimic", follows, joint=pair.leader)
+            fingers = self.robot.gripper.joints
+            if mimic and joint.name in fingers[1:]:
+                ET.SubElement(element, "mimic", joint=fingers[0], multiplier="1", offset="0")
         # One engine reads files in pieces of 1024 bytes a line and may cut an attribute in two.
         ET.indent(root)
         return ET.tostring(root, encoding="unicode")

@@ -82,12 +82,12 @@ class Deviation:
         return not self.only or self.only in scene.words
 
     def with_robot(self, robot: Robot | None) -> Deviation:
-        """The same in a world with this robot. `FOLLOWER` in its patterns is then each joint that
-        follows another one."""
+        """The same in a world with this robot. `FOLLOWER` in its patterns is then each finger that
+        follows the first one."""
         if robot is None or robot.name == MEASURED_ON:
             return self
-        pairs = (*robot.gripper.couplings, *robot.couplings) if FOLLOWER in self.quantity else ()
-        patterns = [self.quantity.replace(FOLLOWER, pair.follower) for pair in pairs]
+        followers = robot.gripper.joints[1:] if FOLLOWER in self.quantity else ()
+        patterns = [self.quantity.replace(FOLLOWER, name) for name in followers]
         within = self.within if self.elsewhere is None else self.elsewhere
         return replace(self, quantity=" ".join(patterns) or self.quantity, within=within)
 

@@ -31,6 +31,7 @@ from pytest_simbench.simulator import (
 )
 
 from .bodies import ONE_CONTACT_ON_A_PLANE, add_body, add_ground, set_surface
+from .couplings import Couplings
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, DARTSettings
 
@@ -38,9 +39,6 @@ dartpy = lazy_import("dartpy")
 
 State = tuple[float, list[tuple[FloatArray, FloatArray, FloatArray]], FloatArray]
 """Time, positions, velocities and accelerations of each skeleton, the command."""
-
-STRONGEST = 1e5
-"""Largest effort of a coupling [N m or N]; of one without limit DART makes 800."""
 
 
 class DART(Simulator):
@@ -89,14 +87,15 @@ class DART(Simulator):
             ),
             Deviation(
                 f"joint/{FOLLOWER}/effort_limit",
-                "a joint that follows has no drive: the other one moves it, a finger by up to both "
-                "limits",
+                "a finger that follows has no drive: the first one moves it, by up to both limits",
             ),
             Deviation(
-                "coupling/*", "dartpy does not tell what a joint follows how", only="coupling"
+                "", "the coupling is one-way: the first finger does not feel the second's load"
             ),
             Deviation(
-                "", "the fingers' coupling is one-way: the first does not feel the second's load"
+                "coupling/*",
+                "the adapter couples joints by impulses before a step; DART knows nothing of it",
+                only="coupling",
             ),
         ),
         install_size_mb=80,
@@ -115,6 +114,7 @@ class DART(Simulator):
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         self._robot: Any = None
+        self._couplings: Couplings | None = None
         self._base = np.empty(0)
         if self.prepared is not None:
             self._load_robot(self.prepared)
@@ -161,16 +161,12 @@ class DART(Simulator):
             for shape in body.getShapeNodes():
                 if shape.hasCollisionAspect():
                     set_surface(shape, robot.friction)
-        coupled = [pair.follower for pair in robot.couplings]
-        followers = [*robot.gripper.joints[1:], *coupled]
+        followers = robot.gripper.joints[1:]
         for drive in robot.joints:
             joint = skeleton.getJoint(drive.name)
             joint.setLimitEnforcement(True)
             limit = drive.effort_limit
-            if drive.name in coupled:
-                joint.setUseCouplerConstraint(True)  # which both joints feel
-                limit = STRONGEST
-            elif drive.name in followers:
+            if drive.name in followers:
                 limit *= 2
             else:
                 joint.setActuatorType(dynamics.ActuatorType.SERVO)
@@ -188,6 +184,8 @@ class DART(Simulator):
         driven = np.array([name not in followers for name in robot.joint_names])
         self._gain = driven * (self.settings.position_gain / self.settings.timestep)
         self._share = driven * (1 - self.settings.position_gain)
+        if robot.couplings:
+            self._couplings = Couplings(skeleton, names, robot.couplings)
         initial = robot.column("initial_position")
         skeleton.setPositions(list(self._index), initial)
         self.world.addSkeleton(skeleton)
@@ -227,6 +225,8 @@ class DART(Simulator):
 
     def step(self) -> None:
         if self._robot is not None:
+            if self._couplings is not None:
+                self._couplings.push()
             self._robot.setCommands(self._base - self._error_gain * self._robot.getPositions())
         self.world.step(False)
 
