@@ -24,6 +24,7 @@ from pytest_simbench.simulator import (
     FOLLOWER,
     Capability,
     Deviation,
+    NotSupportedError,
     PreparedRobot,
     Simulator,
     SimulatorInfo,
@@ -289,6 +290,8 @@ class DART(Simulator):
         return owner if owner == "ground" else f"body/{owner}"
 
     def joint_wrenches(self) -> FloatArray:
+        if self._couplings is not None:
+            raise NotSupportedError("dart tells no wrenches of joints that are coupled")
         rows = []
         for joint in self._joints():
             body = joint.getChildBodyNode()
