@@ -5,7 +5,8 @@ solved together with the contacts. Each step they are told the velocity v* + `po
 (q* - timestep v* - q) / timestep, as Gazebo's ros2_control does it (its gain is 0.1). DART's
 other drive, spring and damper with a rest position, is implicit too but knows no effort limit,
 and contact impulses do not feel its damping: at rest against a contact only m / (m + timestep d)
-of the spring's force arrives, a quarter for a finger. So it is not used.
+of the spring's force arrives, a quarter for a finger. So it is no drive, and only what joints have
+of their own.
 
 What was learnt stands in docs/engines/dart.md.
 """

@@ -3,7 +3,7 @@
 Drives are Bullet's own position motors: velocity constraints that ask, each step, for the velocity
 `velocityGain` (v* - v) + v* + `positionGain` (q* - q) / timestep, with the effort limit as largest
 force. They are not springs: there is no stiffness in N m/rad, and no effort feed-forward, which
-they do not need. The fingers' effort limit is the grip's squeeze.
+they do not need. The fingers' effort limit is the grip's squeeze. What joints do beside: joints.py.
 
 What was learnt stands in docs/engines/pybullet.md.
 """
