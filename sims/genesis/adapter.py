@@ -36,6 +36,7 @@ from .engine import (
     centre_of_mass,
     contact_parameters,
     forget_worlds,
+    keep_apart,
     numbers,
     of_collider,
     start_engine,
@@ -131,7 +132,7 @@ class Genesis(Simulator):
         world.build()
         self.solver = world.rigid_solver
         self._set_contacts(scene)
-        self._keep_apart(scene)
+        keep_apart(self.solver.collider, self._links(), scene.apart)
         self._free = [self._boxes[box.name].links[0].idx for box in scene.free_bodies]
         self._led = [self._boxes[box.name].links[0] for box in scene.prescribed_bodies]
         self._start_bodies(scene)
@@ -163,14 +164,6 @@ class Genesis(Simulator):
             if friction < LEAST_FRICTION:
                 for geom in entity.geoms:
                     solver.set_geom_friction(friction, geom.idx)
-
-    def _keep_apart(self, scene: Scene) -> None:
-        """Take pairs of shapes out of the collider's table."""
-        collider = of_collider(self.solver.collider, "collider_info")
-        table, links = array_of(collider.collision_pair_idx, copy=False), self._links()
-        for pair in scene.apart:
-            first, second = ([shape.idx for shape in links[name].geoms] for name in pair)
-            table[np.ix_(first, second)] = table[np.ix_(second, first)] = -1
 
     def _links(self) -> dict[str, Any]:
         """What the engine has for "ground", each `body/NAME` and `link/NAME`."""

@@ -139,7 +139,7 @@ def _hold(robot: Any, kind: str, first: str, second: str, numbers: list[float]) 
     """An equality constraint between two joints or links. Genesis has no public call for it: this
     is what it calls for those of a file."""
     robot._add_equality(
-        name=f"{first} {second}",
+        name=f"hold {robot.n_equalities}",
         type=getattr(genesis.EQUALITY_TYPE, kind),
         objs_name=(first, second),
         data=np.array([*numbers, *[0.0] * (11 - len(numbers))]),
