@@ -26,6 +26,14 @@ def parity_of_full_scene(subject: Subject) -> None:
         pass  # loading checks parity
 
 
+@check(Capability.SELF_COLLIDE, any_robot)
+def parity_where_links_collide(subject: Subject) -> None:
+    """The robot alone passes parity where its links collide with each other, but for those that one
+    joint joins, also where some of them overlap."""
+    with subject.world(Scene("colliding", robot=replace(subject.arm, self_collide=True))):
+        pass  # loading checks parity
+
+
 def _truth(subject: Subject) -> Scene:
     """The kit's full scene with the robot that the laws are asked with, and no body of several
     shapes where an engine has none."""

@@ -32,6 +32,8 @@ def new_world(scene: Scene, settings: GenesisSettings, *, window: bool) -> Any:
         rigid_options=options.RigidOptions(
             # of a robot, but for links that a joint joins; boxes are entities of their own
             enable_self_collision="self_collide" in scene.words,
+            # also of links that overlap where all joints are at 0, as a Panda's fifth and seventh
+            enable_neutral_collision="self_collide" in scene.words,
             integrator=getattr(genesis.integrator, s.integrator),
             friction_cone=getattr(genesis.friction_cone, s.friction_cone),
             impratio=s.impratio or None,
