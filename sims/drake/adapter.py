@@ -133,8 +133,8 @@ class Drake(Simulator):
         targets = self.plant.get_desired_state_input_port(self.world.model)
         efforts = self.plant.get_actuation_input_port(self.world.model)
         idle = np.zeros(len(self.world.brakes))
-        self._targets = targets.FixValue(self.context, np.concatenate([initial, idle, rest, idle]))
-        self._efforts = efforts.FixValue(self.context, np.concatenate([rest, idle]))
+        self._targets = targets.FixValue(self.context, np.concatenate([idle, initial, idle, rest]))
+        self._efforts = efforts.FixValue(self.context, np.concatenate([idle, rest]))
         self._commanded = (initial, rest, rest)
 
     def read_back(self) -> dict[str, Any]:
@@ -142,10 +142,10 @@ class Drake(Simulator):
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._commanded = (position, velocity, effort)
-        driven = len(position)  # before the brakes of joints with friction
+        driven = -len(position)  # after the brakes of joints with friction
         targets = _values(self._targets).reshape(2, -1)
-        targets[0, :driven], targets[1, :driven] = position, velocity
-        _values(self._efforts)[:driven] = effort
+        targets[0, driven:], targets[1, driven:] = position, velocity
+        _values(self._efforts)[driven:] = effort
 
     def push(self, wrenches: FloatArray) -> None:
         forces = np.zeros(self.plant.num_velocities())

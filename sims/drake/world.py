@@ -237,13 +237,13 @@ class World:
             if s.pad_radius and joint.name in robot.gripper.joints:
                 centres = pad_centres(prepared, joint, s.pad_radius)
                 self._add_spheres(child, joint.child, centres, s.pad_radius, robot.friction)
+        for own in robot.joints:  # before the drives: Drake takes the last actuator's rotor inertia
+            self._add_own(own)
         for drive in robot.joints:
             made = plant.AddJointActuator(drive.name, self.joints[drive.name], drive.effort_limit)
             made.set_default_rotor_inertia(drive.armature)
             made.set_controller_gains(trees.PdControllerGains(p=drive.stiffness, d=drive.damping))
             self.drives[drive.name] = made
-        for drive in robot.joints:  # after all drives, whose ports come first
-            self._add_own(drive)
         self.couplings = [
             plant.AddCouplerConstraint(
                 self.joints[pair.follower], self.joints[pair.leader], pair.ratio, pair.offset
