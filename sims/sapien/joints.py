@@ -10,7 +10,7 @@ from pytest_simbench.simulator import NotSupportedError, lazy_import
 physx = lazy_import("sapien.physx")
 
 RUBBING = 1e6
-"""Damping that holds a joint up to its friction [N m s/rad, N s/m]: the creep is a millionth."""
+"""Damping that holds a joint up to its friction [N m s/rad, N s/m]."""
 
 BOUNDLESS = 3.4e38
 """An impulse that limits nothing [N m s, N s]: the largest of single precision."""
