@@ -111,7 +111,7 @@ class ReadBack(readback.ReadBack):
 
     def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
         active = self.plant.GetConstraintActiveStatus
-        return all(active(self.context, made) for made in self.made.couplings)
+        return all(active(self.context, made) for made in self.made.couplings[: len(pairs)])
 
     def pose(self, part: Part) -> list[float]:
         place = self.plant.EvalBodyPoseInWorld(self.context, part.body) @ part.frame
