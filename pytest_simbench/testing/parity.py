@@ -14,7 +14,7 @@ from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import any_robot, check
 from pytest_simbench.testing.contract import SINGLE
-from pytest_simbench.testing.faults import Fault, robot_faults, rounds, true_scene
+from pytest_simbench.testing.faults import FAULTS, Fault, robot_faults, rounds, true_scene
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require
 
@@ -88,7 +88,7 @@ def planted_faults_are_seen(subject: Subject) -> None:
     missed = []
     robot, capabilities = subject.robot, subject.cls.info.capabilities
     lacking = [deviation for deviation in subject.cls.info.deviations if deviation.only]
-    for faults in [robot_faults(robot)] if robot else rounds(capabilities):
+    for faults in rounds(capabilities, robot_faults(robot) if robot else FAULTS):
         found = planted(subject, faults.values())
         for name, fault in faults.items():
             if any(fault.word == d.only and d.within is None for d in lacking):

@@ -52,9 +52,6 @@ class ReadBack(readback.ReadBack):
             found |= {"damping": self._damping(part), "velocity": self._velocity(part)}
         return found
 
-    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
-        return all(np.array_equal(self.coupling(pair), [1.0, 0.0]) for pair in pairs)
-
     def coupling(self, pair: Coupling) -> FloatArray:
         """Of a constraint between both joints, else not a number."""
         joints = [self.robot.get_joint(name).idx for name in (pair.follower, pair.leader)]
