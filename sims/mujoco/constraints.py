@@ -1,7 +1,4 @@
-"""A file's equality constraints between links: points held together, and joints that move together.
-
-A weld is three points that are held together, not on one line: then nothing turns.
-"""
+"""A file's equality constraints between links: what is held together, and what moves together."""
 
 from __future__ import annotations
 
@@ -18,9 +15,6 @@ if TYPE_CHECKING:
     from .articulated import Tree
 
 mujoco = lazy_import("mujoco")
-
-WIDE = 0.1
-"""Distance of a weld's second and third point from its first [m]."""
 
 OPEN = 1e-6
 """What is held together may be apart by this where the file starts [m; rad]."""
@@ -89,13 +83,10 @@ class Constraints:
         if gap > OPEN:
             self._tell(k, kind, f"where the file starts, it is open by {gap:.3g} m or rad")
             return
-        aside = ([0.0, 0.0, 0.0], [WIDE, 0.0, 0.0], [0.0, WIDE, 0.0])[: 3 if weld else 1]
         if first != second:
-            frames = [self.tree.frame_of(name).inverse() for name in (first, second)]
-            for way in aside:
-                point = Pose(vector3(anchor + np.array(way)))
-                places = [(frame * point).position for frame in frames]
-                self.closures.append(Closure(first, second, places[0], places[1]))
+            point = Pose(vector3(anchor))
+            a, b = ((self.tree.frame_of(n).inverse() * point).position for n in (first, second))
+            self.closures.append(Closure(first, second, a, b, rigid=weld))
         self._tell(k, kind, "")
 
     def _ends(self, k: int) -> tuple[str, str, FloatArray, float] | None:
