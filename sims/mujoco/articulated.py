@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -146,7 +146,7 @@ class Tree:
         geoms = [g for link in self.links if link.whole for g in self.reading.geoms_of(link)]
         frictions = self.model.geom_friction[geoms, 0] if geoms else np.ones(1)
         self._tell(frictions)
-        constraints = Constraints(self)
+        constraints = Constraints(self, [joint.initial_position for joint in joints])
         ET.indent(root)
         return Robot(
             name="tree",
@@ -169,14 +169,14 @@ class Tree:
             return MOUNT
         return next((k.name for k in self.links if k.body == root and k.whole), None)
 
-    def frame_of(self, name: str) -> Pose:
-        """Of the link of that name, in the file's world."""
-        found = (self._frame(link) for link in self.links if link.name == name)
+    def frame_of(self, name: str, data: Any) -> Pose:
+        """Of the link of that name, in the file's world, where the joints are in the data."""
+        found = (self._frame(link, data) for link in self.links if link.name == name)
         return next(found, Pose())
 
-    def _frame(self, link: OnJoint) -> Pose:
+    def _frame(self, link: OnJoint, data: Any = None) -> Pose:
         """Of the link, at its joint, in the file's world."""
-        return self.reading.pose(link.body) * Pose(vector3(self.model.jnt_pos[link.joint]))
+        return self.reading.pose(link.body, data) * Pose(vector3(self.model.jnt_pos[link.joint]))
 
     def _link(self, link: OnJoint) -> Link:
         mass, centre, tensor = self.reading.inertial(link.body)

@@ -23,13 +23,21 @@ OPEN = 1e-6
 class Constraints:
     """Those of a tree of links; told is what became of each.
 
+    Args:
+        tree: of links.
+        starts: where its joints start, from where the file is written [rad or m].
+
     Attributes:
         closures, couplings: of the robot.
         carried: numbers of the constraints that they stand for.
     """
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: Tree, starts: list[float]) -> None:
         self.tree, self.reading, self.model = tree, tree.reading, tree.model
+        self.data = mujoco.MjData(self.model)
+        at = self.model.jnt_qposadr[[link.joint for link in tree.links]]
+        self.data.qpos[at] += starts
+        mujoco.mj_kinematics(self.model, self.data)
         self.closures: list[Closure] = []
         self.couplings: list[Coupling] = []
         self.carried: set[int] = set()
@@ -85,7 +93,8 @@ class Constraints:
             return
         if first != second:
             point = Pose(vector3(anchor))
-            a, b = ((self.tree.frame_of(n).inverse() * point).position for n in (first, second))
+            frames = (self.tree.frame_of(name, self.data) for name in (first, second))
+            a, b = ((frame.inverse() * point).position for frame in frames)
             self.closures.append(Closure(first, second, a, b, rigid=weld))
         self._tell(k, kind, "")
 
@@ -100,7 +109,8 @@ class Constraints:
         names = [self.tree.link_of(reading.root(body)) for body in bodies]
         if names[0] is None or names[1] is None:
             return None
-        frames = [reading.site_pose(o) if at_sites else reading.pose(o) for o in objects]
+        pose = reading.site_pose if at_sites else reading.pose
+        frames = [pose(o, self.data) for o in objects]
         if at_sites:
             turned = frames[0].inverse() * frames[1] if weld else Pose()
             points = [np.asarray(frame.position) for frame in frames]

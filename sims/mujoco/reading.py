@@ -189,17 +189,18 @@ class Reading:
 
     # Bodies
 
-    def pose(self, body: int) -> Pose:
-        """Of a body in the file's world."""
-        return _pose(self.data.xpos[body], self.data.xquat[body])
+    def pose(self, body: int, data: Any = None) -> Pose:
+        """Of a body in the file's world; by other data, where the joints stand elsewhere."""
+        data = data or self.data
+        return _pose(data.xpos[body], data.xquat[body])
 
     def geom_pose(self, geom: int) -> Pose:
         """Of a shape in the file's world."""
         return _pose(self.data.geom_xpos[geom], _quaternion(self.data.geom_xmat[geom]))
 
-    def site_pose(self, site: int) -> Pose:
-        """Of a site in the file's world."""
-        return _pose(self.data.site_xpos[site], _quaternion(self.data.site_xmat[site]))
+    def site_pose(self, site: int, data: Any) -> Pose:
+        """The same of a site."""
+        return _pose(data.site_xpos[site], _quaternion(data.site_xmat[site]))
 
     def _placed(self, name: str, root: int, geoms: list[int]) -> Placed:
         model = self.model
