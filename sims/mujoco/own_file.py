@@ -36,7 +36,7 @@ EXCUSED = {
 }
 """Quantities in which the file may differ from its scene, by those of the account."""
 
-OF_JOINTS = "joint/* link/* gripper/* body/*/touches ground/touches"
+OF_JOINTS = "joint/* link/* gripper/* coupling/* closure/* body/*/touches ground/touches"
 """Quantities of joints and links, which are not read back of a file."""
 
 

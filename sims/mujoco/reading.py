@@ -376,7 +376,7 @@ class Reading:
             lowest = [-float(p.body.reach_placed(down)[0]) for p in moved if p.root]
             self.lift = max(0.0, -min(lowest, default=0.0))
             friction = max((p.body.friction for p in placed), default=1.0)
-            reason = "the file has none; a level ground at z = 0 is there in addition"
+            reason = "the file has none; a level ground at z = 0 is there, which free bodies touch"
             self.tell("geom plane", APPROXIMATED, reason)
         if self.lift:
             reason = f"all is moved up by {self.lift:g} m, so that the ground is at z = 0"
