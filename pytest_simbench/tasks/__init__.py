@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.arm_following import ArmFollowing, CorrectedArmFollowing
     from pytest_simbench.tasks.arm_pushing import ArmPushing
     from pytest_simbench.tasks.base import Jitter, Moment, Outcome, Task
+    from pytest_simbench.tasks.holding import Holding
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
     from pytest_simbench.tasks.settling import Settling, rests_on
     from pytest_simbench.tasks.stacking import Stacking
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.towers import LeaningTowers
 
 __all__ = [
-    "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Jitter",
+    "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Holding", "Jitter",
     "LeaningTowers", "Moment", "Outcome", "Pushing", "Settling", "Stacking", "Task", "Throwing",
     "Tossing",
     "rests_on",
@@ -28,6 +29,7 @@ _MODULES = {
     "arm_following": ("ArmFollowing", "CorrectedArmFollowing"),
     "arm_pushing": ("ArmPushing",),
     "base": ("Jitter", "Moment", "Outcome", "Task"),
+    "holding": ("Holding",),
     "pushing": ("CurvePushing", "Pushing"),
     "settling": ("Settling", "rests_on"),
     "stacking": ("Stacking",),
