@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.base import Jitter, Moment, Outcome, Task
     from pytest_simbench.tasks.holding import Holding
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
+    from pytest_simbench.tasks.replaying import Log, Replaying
     from pytest_simbench.tasks.settling import Settling, rests_on
     from pytest_simbench.tasks.stacking import Stacking
     from pytest_simbench.tasks.throwing import Throwing
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Holding", "Jitter",
-    "LeaningTowers", "Moment", "Outcome", "Pushing", "Settling", "Stacking", "Task", "Throwing",
-    "Tossing",
+    "LeaningTowers", "Log", "Moment", "Outcome", "Pushing", "Replaying", "Settling", "Stacking",
+    "Task", "Throwing", "Tossing",
     "rests_on",
 ]  # fmt: skip
 
@@ -31,6 +32,7 @@ _MODULES = {
     "base": ("Jitter", "Moment", "Outcome", "Task"),
     "holding": ("Holding",),
     "pushing": ("CurvePushing", "Pushing"),
+    "replaying": ("Log", "Replaying"),
     "settling": ("Settling", "rests_on"),
     "stacking": ("Stacking",),
     "throwing": ("Throwing",),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -91,17 +91,25 @@ class OnJoints(OnScene):
     def joints(self) -> tuple[str, ...]:
         return () if self.world.robot is None else self.world.robot.joint_names
 
+    @property
+    def measured(self) -> Sequence[str]:
+        """The joints of which something is measured."""
+        return self.joints
+
     @cached_property
     def kinds(self) -> Mapping[str, tuple[NDArray[np.bool_], float, str]]:
-        """Which joints are hinges and which are sliders, (n_joints,), where it has such, the factor
-        from rad or m to the unit in which they are measured, and that unit."""
+        """Which of the measured joints are hinges and which are sliders, (n_joints,), where there
+        are such, the factor from rad or m to the unit in which they are measured, and that unit."""
         kinds = {joint.name: joint.kind for joint in PreparedRobot(self.robot).joints}
-        hinges = np.array([kinds[name] == "revolute" for name in self.joints])
-        found = {"hinges": (hinges, 180 / np.pi, "deg"), "sliders": (~hinges, 1000.0, "mm")}
+        own = [kinds[name] if name in self.measured else "" for name in self.joints]
+        found = {
+            "hinges": (np.array([kind == "revolute" for kind in own]), 180 / np.pi, "deg"),
+            "sliders": (np.array([kind == "prismatic" for kind in own]), 1000.0, "mm"),
+        }
         return {kind: told for kind, told in found.items() if told[0].any()}
 
     def by_kind(self, name: str, values: FloatArray) -> dict[str, float | None]:
-        """The largest of values of the joints, (n_joints,), for each kind, in its unit."""
+        """The largest of values, (n_joints,), for each kind of joint, in its unit."""
         return {
             f"{name}_{kind}": factor * float(values[own].max())
             for kind, (own, factor, _) in self.kinds.items()
