@@ -13,10 +13,14 @@ from pytest_simbench.client.launch import Launch
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.description.carried import Carried
 from pytest_simbench.description.mjcf_check import check_mjcf
+from pytest_simbench.description.urdf_scene import read_urdf_scene
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import Scene, Start
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.registry import adapter, address, registered
+
+URDF = ".urdf"
+"""Ending of scenes that need no engine to be read."""
 
 NOT_YET = (".sdf", ".world", ".usd", ".usda", ".usdc", ".usdz")
 """Endings of scenes that nobody here reads yet."""
@@ -38,7 +42,7 @@ class SceneFile:
 
 
 def read_scene_file(path: str | Path) -> SceneFile:
-    """Read a file by the first engine here that reads such files.
+    """Read a file by the first engine here that reads such files; a URDF without any.
 
     What was read is kept, until the file changes. (Files that it includes and meshes are not
     looked at for that.)
@@ -48,10 +52,20 @@ def read_scene_file(path: str | Path) -> SceneFile:
             it; one sentence with the file, and its line where that is known.
     """
     whole = Path(path).absolute()
+    if whole.suffix.lower() == URDF:
+        return _urdf(whole, *_stamp(whole))
     name = _reader(whole).name
     check_mjcf(str(whole))
-    status = whole.stat()
-    return _ask(name, whole, status.st_size, status.st_mtime_ns)
+    return _ask(name, whole, *_stamp(whole))
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """Size and time of change, which tell whether a file is new; zeros where it is not there."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        return 0, 0  # the reader says so
+    return status.st_size, status.st_mtime_ns
 
 
 def _reader(path: Path) -> SimulatorInfo:
@@ -66,7 +80,7 @@ def _reader(path: Path) -> SimulatorInfo:
         raise DescriptionError(
             f"{path} is read by {reading[0].title}, which is not here: {reading[0].install}"
         )
-    known = ", ".join(sorted({ending for info in infos for ending in info.reads}))
+    known = ", ".join(sorted({URDF, *(ending for info in infos for ending in info.reads)}))
     if ending in NOT_YET:
         raise DescriptionError(
             f"{path}: {ending} files are not read yet; convert it to MJCF ({known})"
@@ -75,8 +89,14 @@ def _reader(path: Path) -> SimulatorInfo:
 
 
 @cache
+def _urdf(path: Path, size: int, modified: int) -> SceneFile:
+    """What is read of a URDF, without any engine."""
+    return SceneFile(path, *read_urdf_scene(path))
+
+
+@cache
 def _ask(name: str, path: Path, size: int, modified: int) -> SceneFile:
-    """What a simulator reads of a file, of which size and time of change tell whether it is new."""
+    """What a simulator reads of a file."""
     info = adapter(name).info
     with tempfile.NamedTemporaryFile(prefix="simbench-reader-", suffix=".log") as log:
         launch = Launch(

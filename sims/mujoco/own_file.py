@@ -54,9 +54,9 @@ class OwnFile:
     """
 
     def __init__(self, scene: Scene, timestep: float) -> None:
-        if not scene.file:
+        if not scene.file or scene.file.lower().endswith(".urdf"):
             raise NotSupportedError(
-                f"scene {scene.name!r} was read from no file, and the profile `file` loads files; "
+                f"scene {scene.name!r} was read from no MJCF file, which the profile `file` loads; "
                 "choose another profile"
             )
         self.reading = reading = Reading(scene.file)
