@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pytest_simbench.client.world import Motion, World
 from pytest_simbench.description.urdf import PreparedRobot
-from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.metrics import RESOLUTIONS, Metric
 from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Robot, Scene, SceneError, Start
 from pytest_simbench.tasks.base import Jitter, Task, distance
 
@@ -118,7 +118,7 @@ class OnJoints(OnScene):
     def metric_by_kind(self, name: str, title: str, doc: str, per: str = "") -> list[Metric]:
         return [
             Metric(f"{name}_{kind}", f"{title}, {kind}", unit=unit + per, better="lower", least=0,
-                   doc=doc)
+                   doc=doc, resolution=RESOLUTIONS[unit])
             for kind, (_, _, unit) in self.kinds.items()
         ]  # fmt: skip
 
