@@ -120,7 +120,7 @@ def test_a_recording_of_ours_is_read_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "why"),
     [
-        ({"time": TIME, "knee": TIME}, "holds 'knee'.*has the joints hinge, slider"),
+        ({"time": TIME, "knee": TIME}, "holds 'knee'.* it has hinge, slider, table/pose"),
         ({"time": TIME, "table/pose": np.zeros((21, 7)), "hinge": TIME}, "no unit length"),
         ({"time": TIME, "hinge": TIME * np.nan}, "no finite number of 'hinge' in row 0"),
         ({"time": TIME[::-1], "hinge": TIME}, "goes from 1 s to 0.95 s in row 1"),
@@ -131,6 +131,8 @@ def test_a_recording_of_ours_is_read_back(tmp_path: Path) -> None:
         ({"time": TIME, "position": np.zeros((21, 3))}, "of 3 joints, and the scene has 2"),
         ({"time": TIME, "hinge/velocity": TIME}, "has positions of no joint"),
         ({"hinge": TIME}, "no column 'time'"),
+        ({"time": TIME[:20].reshape(10, 2), "hinge": TIME[:10]}, "no column 'time'"),
+        ({"time": TIME, "hinge": np.zeros(0)}, "in the shape"),
         ({"time": TIME * 0.01, "hinge": TIME}, "lasts 0.01 s"),
         ({"time": TIME * 1000, "hinge": TIME}, "lasts 1000 s"),
     ],
@@ -143,7 +145,7 @@ def test_what_cannot_be_is_one_sentence(tmp_path: Path, arrays: Any, why: str) -
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("time,hinge\n0,0\n1\n", "line 3 has 1 values for 2 columns"),
+        ("time,hinge\n0,0\n1\n", "line 3: 1 values for 2 columns"),
         ("time,hinge\n0,0\n1,a\n", "line 3: could not convert"),
         ("time,time\n0,0\n", "two columns of one name"),
         ("time,hinge\n0,0\n1,nan\n", "no finite number of 'hinge' in row 1"),
