@@ -5,19 +5,14 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 from pytest_simbench.description import rounded
-from pytest_simbench.description.carried import (
-    APPROXIMATED,
-    CARRIED,
-    NOT_CARRIED,
-    Carried,
-    named,
-)
+from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.mesh_check import PACKAGE
 from pytest_simbench.description.robot_files import content, keep, keep_mesh
@@ -91,13 +86,10 @@ class _World(Description):
             )
             if min(radius, length) <= 0:
                 self.refuse(link, f"has a {shape.tag} whose size is not above 0", shape)
-            made = rounded.cylinder(radius, length / 2) if long else rounded.capsule(radius)
-            points, gap = made
-            hull = Polytope(points)
-            kept = keep_mesh(written_stl(hull.points[np.array(hull.triangles)]))
+            kept, gap = _round(radius, length / 2 if long else 0.0)
             geometry.remove(shape)
-            ET.SubElement(geometry, "mesh", filename=str(kept))
-            self._meshes[str(kept)] = str(kept)
+            ET.SubElement(geometry, "mesh", filename=kept)
+            self._meshes[kept] = kept
             name = link.get("name", "")
             self._round[name] = max(gap, self._round.get(name, 0.0))
             return
@@ -119,7 +111,8 @@ class _World(Description):
         self._only(joint, joint, "limit").set("velocity", repr(FASTEST))
         self._dynamics[name] = 0.0, 0.0
         for dynamics in self._at_most_one(joint, joint, "dynamics"):
-            damping, friction = (self.number(joint, dynamics, k, "0") for k in DYNAMICS)
+            damping = self.number(joint, dynamics, "damping", "0")
+            friction = self.number(joint, dynamics, "friction", "0")
             if min(damping, friction) < 0:
                 self.refuse(joint, "has a damping or friction below 0", dynamics)
             self._dynamics[name] = damping, friction
@@ -159,10 +152,9 @@ class _World(Description):
             if name in self._dynamics and limit is not None:
                 limits[name] = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
                 if mimic is not None:
-                    ratio, offset = (
-                        float(mimic.get(k, d)) for k, d in (("multiplier", "1"), ("offset", "0"))
-                    )
-                    mimics[name] = Coupling(name, mimic.get("joint", ""), ratio, offset)
+                    ratio, offset = mimic.get("multiplier", "1"), mimic.get("offset", "0")
+                    leader = mimic.get("joint", "")
+                    mimics[name] = Coupling(name, leader, float(ratio), float(offset))
         starts: dict[str, float] = {}
         open_: list[str] = []
 
@@ -214,7 +206,12 @@ class _World(Description):
             tell(tag, NOT_CARRIED, REASONS.get(tag, "nothing here reads it"), dict.fromkeys(names))
 
 
-DYNAMICS = ("damping", "friction")
+@cache
+def _round(radius: float, half: float) -> tuple[str, float]:
+    """A mesh of a cylinder of that half length, or with none of a sphere [m], and its `gap`."""
+    points, gap = rounded.cylinder(radius, half) if half else rounded.capsule(radius)
+    hull = Polytope(points)
+    return str(keep_mesh(written_stl(hull.points[np.array(hull.triangles)]))), gap
 
 
 def packages_of(path: Path) -> Mapping[str, str]:

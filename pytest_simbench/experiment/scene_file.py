@@ -53,19 +53,11 @@ def read_scene_file(path: str | Path) -> SceneFile:
     """
     whole = Path(path).absolute()
     if whole.suffix.lower() == URDF:
-        return _urdf(whole, *_stamp(whole))
+        return SceneFile(whole, *read_urdf_scene(whole))
     name = _reader(whole).name
     check_mjcf(str(whole))
-    return _ask(name, whole, *_stamp(whole))
-
-
-def _stamp(path: Path) -> tuple[int, int]:
-    """Size and time of change, which tell whether a file is new; zeros where it is not there."""
-    try:
-        status = path.stat()
-    except (OSError, ValueError):
-        return 0, 0  # the reader says so
-    return status.st_size, status.st_mtime_ns
+    status = whole.stat()
+    return _ask(name, whole, status.st_size, status.st_mtime_ns)
 
 
 def _reader(path: Path) -> SimulatorInfo:
@@ -89,14 +81,8 @@ def _reader(path: Path) -> SimulatorInfo:
 
 
 @cache
-def _urdf(path: Path, size: int, modified: int) -> SceneFile:
-    """What is read of a URDF, without any engine."""
-    return SceneFile(path, *read_urdf_scene(path))
-
-
-@cache
 def _ask(name: str, path: Path, size: int, modified: int) -> SceneFile:
-    """What a simulator reads of a file."""
+    """What a simulator reads of a file, of which size and time of change tell whether it is new."""
     info = adapter(name).info
     with tempfile.NamedTemporaryFile(prefix="simbench-reader-", suffix=".log") as log:
         launch = Launch(
