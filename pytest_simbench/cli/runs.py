@@ -18,7 +18,7 @@ from pytest_simbench.cli.values import BadInput, refusing
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.settling import TASK as SETTLING
-from pytest_simbench.records.folder import RECORDS, TASKS, Reading, RunFolder
+from pytest_simbench.records.folder import RECORDS, TASKS, RunContents, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name, opened, whole
 from pytest_simbench.records.record import Record, RecordError
@@ -33,7 +33,7 @@ from pytest_simbench.report.files import (
     write_tables,
 )
 from pytest_simbench.report.model import sweep
-from pytest_simbench.report.model.outcome import Outcome
+from pytest_simbench.report.model.outcome import RunOutcome
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.replay.recorded import FOLDER, write_bags
@@ -55,14 +55,14 @@ Folders = dict[str, RunFolder]
 """Of runs, by the names that a user gave."""
 
 
-def _read(names: Sequence[str]) -> tuple[Folders, dict[str, Reading]]:
+def _read(names: Sequence[str]) -> tuple[Folders, dict[str, RunContents]]:
     """Folders of runs, or of files of records, and what each holds.
 
     Raises:
         BadInput: one cannot be read, or is named twice.
     """
     folders: Folders = {}
-    readings: dict[str, Reading] = {}
+    readings: dict[str, RunContents] = {}
     files: set[Path] = set()
     for name in names:
         path = Path(name)
@@ -76,19 +76,19 @@ def _read(names: Sequence[str]) -> tuple[Folders, dict[str, Reading]]:
     return folders, readings
 
 
-def _outcome(folders: Folders) -> tuple[Outcome, list[str]]:
+def _outcome(folders: Folders) -> tuple[RunOutcome, list[str]]:
     """How runs ended together, and what is wrong with what says so. Whether the tests passed is not
     known where one run does not know, and a comparison is that of one run alone."""
-    found = [Outcome.read(folder.path) for folder in folders.values()]
+    found = [RunOutcome.read(folder.path) for folder in folders.values()]
     outcomes, wrong = [outcome for outcome, _ in found], [text for _, text in found if text]
     if len(outcomes) == 1:
         return outcomes[0], wrong
     passed = [outcome.passed for outcome in outcomes]
     together = False if False in passed else None if None in passed else True
-    return Outcome(together, looks=max(outcome.looks for outcome in outcomes)), wrong
+    return RunOutcome(together, looks=max(outcome.looks for outcome in outcomes)), wrong
 
 
-def _merged(readings: dict[str, Reading]) -> tuple[list[Merged], Reading]:
+def _merged(readings: dict[str, RunContents]) -> tuple[list[Merged], RunContents]:
     """The records of runs as those of one: with where each comes from, and to be shown.
 
     Raises:
@@ -99,7 +99,7 @@ def _merged(readings: dict[str, Reading]) -> tuple[list[Merged], Reading]:
         tasks = merge_tasks({name: found.tasks for name, found in readings.items()})
     if not records:
         raise BadInput("none of the runs holds a repetition that ended")
-    return records, Reading(records=tuple(item.record for item in records), tasks=tasks)
+    return records, RunContents(records=tuple(item.record for item in records), tasks=tasks)
 
 
 def merge_runs(
@@ -128,7 +128,7 @@ def merge_runs(
         outcome, wrong = _outcome(folders)
         written = write_report(folder, looks=outcome.looks)
         problems = [*_problems(readings), *refused, *unsaved, *written.problems, *wrong]
-        ended = Outcome(outcome.passed, looks=outcome.looks)
+        ended = RunOutcome(outcome.passed, looks=outcome.looks)
         problems.append(write_outcome(folder.path, ended))
         problems += _extras(folder.path, folder.path, reading.records, outcome, **more)
         _print(written, verbose, problems)
@@ -177,7 +177,7 @@ def report_runs(
     return 0 if written.complete else 1
 
 
-def _problems(readings: dict[str, Reading]) -> list[str]:
+def _problems(readings: dict[str, RunContents]) -> list[str]:
     return [text for reading in readings.values() for text in reading.problems]
 
 
@@ -209,7 +209,7 @@ def _extras(
     run: Path | None,
     target: Path | None,
     records: Sequence[Record],
-    outcome: Outcome,
+    outcome: RunOutcome,
     badge: str | None = None,
     record: str | None = None,
 ) -> list[str]:

@@ -32,7 +32,7 @@ class DataMissing(DataError):
     """A data set that is not on this machine; the sentence ends with the command that brings it."""
 
 
-class Motion(ABC):
+class MeasuredMotion(ABC):
     """One measured motion."""
 
     @property
@@ -45,7 +45,7 @@ class Motion(ABC):
         """What makes it what it is, as bytes and numbers."""
 
 
-M = TypeVar("M", bound=Motion)
+M = TypeVar("M", bound=MeasuredMotion)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pytest_simbench.data.measured import DataError, Half, Measured, Motion, read_motions
+from pytest_simbench.data.measured import DataError, Half, Measured, MeasuredMotion, read_motions
 from pytest_simbench.records.paths import whole, write_whole
 from pytest_simbench.scene import FloatArray
 
@@ -58,7 +58,7 @@ the recordings hold no commands)."""
 
 
 @dataclass(frozen=True, eq=False)
-class ArmRun(Motion):
+class ArmRun(MeasuredMotion):
     """One run.
 
     Attributes:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_simbench.data.measured import DataError, Half, Measured, Motion, read_motions
+from pytest_simbench.data.measured import DataError, Half, Measured, MeasuredMotion, read_motions
 from pytest_simbench.data.torch_file import read_tensor
 from pytest_simbench.records.paths import whole
 from pytest_simbench.scene import FloatArray, Pose, Vector3
@@ -43,7 +43,7 @@ PATTERN = "contactnets_cube_tosses*.npz"
 
 
 @dataclass(frozen=True, eq=False)
-class Toss(Motion):
+class Toss(MeasuredMotion):
     """One toss.
 
     Attributes:

@@ -120,6 +120,17 @@ def links_collide(prepared: PreparedRobot, first: str, second: str) -> bool:
     return prepared.robot.self_collide and {first, second} not in joined(prepared)
 
 
+def check_apart(scene: Scene, prepared: PreparedRobot | None) -> None:
+    """Raise `SceneError` for a pair kept apart that names no link of the reduced robot."""
+    links = () if prepared is None else prepared.links
+    for name in sorted({name for pair in scene.apart for name in pair}):
+        if name.startswith("link/") and name.removeprefix("link/") not in links:
+            raise SceneError(
+                f"scene {scene.name!r}: {name!r} is kept apart, and the robot has no such link; "
+                f"choose from {', '.join(links)}"
+            )
+
+
 def check_robot(robot: Robot) -> None:
     """Check all files of a robot, and that they fit its drives.
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from pytest_simbench.measure.intervals import Interval
 from pytest_simbench.measure.results import ResultSet
-from pytest_simbench.measure.verdicts import ERROR, Claim, Judgement, judge
+from pytest_simbench.measure.verdicts import ERROR, Bound, Judgement, judge
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 
@@ -75,7 +75,7 @@ class SequentialResultSet(ResultSet):
         self.error = plan.error
         self._more = more
 
-    def _decide(self, claim: Claim, interval: Callable[[], Interval]) -> Judgement:
+    def _decide(self, claim: Bound, interval: Callable[[], Interval]) -> Judgement:
         while True:
             found = judge(claim, interval())
             later = [n for n in self.plan.looks if n > len(self.records)]

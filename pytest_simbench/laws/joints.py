@@ -55,7 +55,7 @@ class Passive(Law, name="", phenomenon="joints"):
         return found[:, :n], found[:, n:], bent
 
 
-class Motion(
+class JointMotion(
     Passive, name="", quantity="largest distance of a joint from its place", unit="rad or m"
 ):
     """Where the joints are after a time, by the equations of motion."""
@@ -189,7 +189,7 @@ class PendulumEnergyDrift(PendulumEnergy, study_timeout=LONG):
 
 
 @dataclass(frozen=True)
-class DoublePendulum(Motion):
+class DoublePendulum(JointMotion):
     """Two pendulums, one hung on the other (Lagrange), against the equations of motion. Tolerance:
     late by one step, and a velocity that is late by one step all the time: |v| dt + |a| t dt."""
 
@@ -218,7 +218,7 @@ class DoublePendulumEnergy(_Energy):
 
 
 @dataclass(frozen=True)
-class SwingingSlider(Motion):
+class SwingingSlider(JointMotion):
     """A mass slides without friction along a rod that swings: Coriolis force, centrifugal force and
     gravity, r'' = r q'^2 + g cos q, (I + m r^2) q'' = -m g r sin q - 2 m r r' q'. Tolerance as of
     `DoublePendulum`."""
@@ -231,7 +231,7 @@ class SwingingSlider(Motion):
 
 
 @dataclass(frozen=True)
-class SphericalPendulum(Motion, gravity=(3.0, 4.0, -8.0)):
+class SphericalPendulum(JointMotion, gravity=(3.0, 4.0, -8.0)):
     """A bob on two crossed hinges that moves out of their planes: gyroscopic terms of three
     dimensions, against the equations of motion. Tolerance as of `DoublePendulum`."""
 

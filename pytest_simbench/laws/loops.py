@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from pytest_simbench.description.links import ends, reduced
 from pytest_simbench.laws.base import Reading, Watched, rounding, solved
-from pytest_simbench.laws.joints import Motion, Passive
+from pytest_simbench.laws.joints import JointMotion, Passive
 from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
 from pytest_simbench.scene import Closure, FloatArray, Robot, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
@@ -123,7 +123,7 @@ class FourBarClosure(_FourBar, quantity="largest opening of the loop", unit="mm"
 
 
 @dataclass(frozen=True)
-class FourBarSwing(_FourBar, Motion):
+class FourBarSwing(_FourBar, JointMotion):
     """A four-bar linkage that is let go swings as its one degree of freedom has it: Lagrange's
     equation of the crank's angle, coupler and rocker by the loop equation. Tolerance as of
     `DoublePendulum`."""

@@ -131,7 +131,7 @@ def differences(
             right = given.get(metric.name) if metric.better is None else None
             values = {key: _off(found, right) for key, found in _values(ended, metric).items()}
             known = metric if right is None else replace(metric, better="lower")
-            tests += [_Test(a, b, known, values[a], values[b]) for a, b in pairs]
+            tests += [_Pair(a, b, known, values[a], values[b]) for a, b in pairs]
         result += _judged(family, [test for test in tests if test.common])
     return result
 
@@ -163,7 +163,7 @@ def _off(values: Values, right: float | None) -> Values:
     return {seed: None if v is None else abs(v - right) for seed, v in values.items()}
 
 
-class _Test:
+class _Pair:
     """Two sides at one metric, before the other tests of the family are known.
 
     Attributes:
@@ -222,7 +222,7 @@ class _Test:
         return whole and equivalence(first, second, MARGIN).equivalent()
 
 
-def _judged(family: Family, tests: Sequence[_Test]) -> list[Difference]:
+def _judged(family: Family, tests: Sequence[_Pair]) -> list[Difference]:
     """All tests of a family together."""
     if not tests:
         return []
@@ -301,7 +301,7 @@ def _signs(seeds: int, tests: int) -> Iterator[FloatArray]:
         left -= block
 
 
-def _interval(test: _Test, reach: float, *, decided: bool) -> tuple[float | None, float | None]:
+def _interval(test: _Pair, reach: float, *, decided: bool) -> tuple[float | None, float | None]:
     """The differences that the same statistic, of the gaps less a difference, does not reject.
 
     None where all pairs have one gap, which is no spread, or are too few. Where stepping down

@@ -68,7 +68,7 @@ class History:
 
 
 @dataclass(frozen=True)
-class Course:
+class MetricCourse:
     """One metric over the releases.
 
     Attributes:
@@ -86,7 +86,7 @@ class TaskHistory(History):
     """A task over the releases: the results of each, and the courses of each metric and cost."""
 
     results: tuple[ResultSet, ...]
-    courses: tuple[Course, ...] = field(default=())
+    courses: tuple[MetricCourse, ...] = field(default=())
 
     def sentences(self) -> list[str]:
         """What changed with which release, how much, and how sure; and which releases crashed."""
@@ -146,14 +146,14 @@ def histories(
     return [replace(h, courses=tuple(_changed(c, number) for c in _courses(h))) for h in found]
 
 
-def _courses(history: TaskHistory) -> list[Course]:
+def _courses(history: TaskHistory) -> list[MetricCourse]:
     """Each metric, cost and the crashes over the releases; without those that nobody has."""
     results = history.results
     metrics = list(results[-1].metrics.values())
     metrics += [results[-1].metric(name) for name in COSTS if name not in results[-1].metrics]
-    courses = [Course(m, tuple(_values(m.name, results, k) for k in range(len(results))))
+    courses = [MetricCourse(m, tuple(_values(m.name, results, k) for k in range(len(results))))
                for m in metrics]  # fmt: skip
-    courses.append(Course(CRASHED, tuple(result.crashed_by_seed() for result in results)))
+    courses.append(MetricCourse(CRASHED, tuple(result.crashed_by_seed() for result in results)))
     return [course for course in courses if any(course.values)]
 
 
@@ -167,7 +167,7 @@ def _values(name: str, results: Sequence[ResultSet], place: int) -> Mapping[int,
     return results[place].by_seed(name)
 
 
-def _changed(course: Course, rows: int) -> Course:
+def _changed(course: MetricCourse, rows: int) -> MetricCourse:
     present = [values for values in course.values if values]
     found = change_points(present, rows=rows)
     if course.metric.name in COSTS:
@@ -208,7 +208,7 @@ class Reached:
 
 
 @dataclass(frozen=True)
-class Row:
+class LawRow:
     """One law, of a phenomenon, and what each release reached; None where it was not asked."""
 
     name: str
@@ -231,7 +231,7 @@ class Row:
 class LawHistory(History):
     """All laws of a test over the releases, in the order of their phenomena."""
 
-    laws: tuple[Row, ...]
+    laws: tuple[LawRow, ...]
 
     @property
     def title(self) -> str:
@@ -278,7 +278,7 @@ def law_histories(records: Iterable[Record]) -> list[LawHistory]:
         if len(releases) >= FEWEST_OF_LAWS:
             tasks = [task for task, _ in laws]
             rows = [
-                Row(
+                LawRow(
                     task if tasks.count(task) == 1 else f"{task} [{key.parameters}]",
                     str(next(iter(of_release.values()))[0].settings[PHENOMENON]),
                     tuple(Reached.of(of_release[v]) if v in of_release else None for v in releases),

@@ -22,7 +22,7 @@ Ratios = Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Verdict:
+class PhenomenonVerdict:
     """Who is right about one phenomenon.
 
     Attributes:
@@ -46,7 +46,7 @@ def better(one: Ratios, other: Ratios) -> bool:
     return bool(_kept(one) & _broken(other)) and not _kept(other) & _broken(one)
 
 
-def verdict(found: Mapping[str, Ratios]) -> Verdict:
+def verdict(found: Mapping[str, Ratios]) -> PhenomenonVerdict:
     """The verdict on the laws of one phenomenon, which are given by contender."""
     laws = {law for ratios in found.values() for law in ratios}
     compared = {who: ratios for who, ratios in found.items() if ratios.keys() == laws}
@@ -61,7 +61,7 @@ def verdict(found: Mapping[str, Ratios]) -> Verdict:
         if len(compared) > 1
         and all(better(compared[who], compared[other]) for other in compared if other != who)
     ]
-    return Verdict(
+    return PhenomenonVerdict(
         len(laws),
         best[0] if best else None,
         unbeaten,

@@ -11,7 +11,7 @@ from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, pr
 from pytest_simbench.measure.limits import CRASHED, check_threshold
 from pytest_simbench.measure.verdicts import (
     ERROR,
-    Claim,
+    Bound,
     Judgement,
     Verdict,
     at_least,
@@ -153,7 +153,7 @@ class ResultSet:
         """
         return proportion(len(self.crashed), len(self.ok) + len(self.crashed), confidence)
 
-    def judge(self, name: str, claim: Claim) -> Judgement:
+    def judge(self, name: str, claim: Bound) -> Judgement:
         """What the repetitions say of a claim about a metric's true mean."""
         return self._decide(claim, lambda: self._judged(self.metric(name)))
 
@@ -164,7 +164,7 @@ class ResultSet:
             return self.crash_interval(level)
         return self.interval(metric.name, level)
 
-    def _decide(self, claim: Claim, interval: Callable[[], Interval]) -> Judgement:
+    def _decide(self, claim: Bound, interval: Callable[[], Interval]) -> Judgement:
         return judge(claim, interval())
 
     def assert_at_least(self, name: str, threshold: float) -> None:
@@ -234,7 +234,7 @@ class ResultSet:
         self.judged.append((CRASHED, found))
         raise AssertionError(f"{self._crashes()}{why}")
 
-    def _assert(self, name: str, *claims: Claim) -> None:
+    def _assert(self, name: str, *claims: Bound) -> None:
         __tracebackhide__ = True
         metric = self.metric(name)
         for claim in claims:

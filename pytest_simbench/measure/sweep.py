@@ -55,7 +55,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Line:
+class SweepLine:
     """One configuration of one simulator at a law.
 
     Attributes:
@@ -92,13 +92,13 @@ class Swept:
     law: str
     phenomenon: str
     unit: str
-    lines: tuple[Line, ...]
+    lines: tuple[SweepLine, ...]
     tolerances: Mapping[float, float]
     allowed: float
 
 
 @dataclass(frozen=True)
-class Choice:
+class StepChoice:
     """The step [s] to take for a phenomenon: how many of its laws are kept with an error that
     `REFERENCE` may cost, at CPU seconds for a simulated second, the mean over the laws."""
 
@@ -140,7 +140,7 @@ def tolerance_at(step: float, known: Mapping[float, float]) -> float:
     return float(math.exp(np.interp(math.log(step), np.log(steps), logs)))
 
 
-def choice(laws: Sequence[Swept], who: tuple[str, str, str, int]) -> Choice | None:
+def choice(laws: Sequence[Swept], who: tuple[str, str, str, int]) -> StepChoice | None:
     """The step at which a simulator keeps most of a phenomenon's laws as well as `REFERENCE` may;
     of several such steps the cheapest. None where it did none of them."""
     at: dict[float, list[tuple[Point, float]]] = {}
@@ -154,14 +154,14 @@ def choice(laws: Sequence[Swept], who: tuple[str, str, str, int]) -> Choice | No
     for step, points in at.items():
         costs = [point.cost for point, _ in points if point.cost is not None]
         kept = sum(point.error <= allowed for point, allowed in points)
-        found.append(Choice(step, kept, asked, fmean(costs) if costs else None))
+        found.append(StepChoice(step, kept, asked, fmean(costs) if costs else None))
     return min(found, key=lambda c: (-c.kept, _or_infinite(c.cost), -c.step)) if asked else None
 
 
-def _lines(records: Sequence[Record], unit: str) -> list[Line]:
+def _lines(records: Sequence[Record], unit: str) -> list[SweepLine]:
     """Of one law."""
     ordered = sorted(records, key=lambda r: RowKey.of(r).order)
-    found: list[Line] = []
+    found: list[SweepLine] = []
     for key, group in grouped(ordered, lambda r: RowKey.of(r)[:4]).items():
         stepless = [replace(r, settings={**r.settings, "timestep": 0.0}) for r in group]
         origin = {id(copy): record for copy, record in zip(stepless, group, strict=True)}
@@ -170,7 +170,7 @@ def _lines(records: Sequence[Record], unit: str) -> list[Line]:
             fine = [point for point in points if math.isfinite(point.error)]
             columns = ([getattr(p, name) for p in fine] for name in ("step", "error", "rounding"))
             number = 1 + sum(line.who[:3] == key[:3] for line in found)
-            found.append(Line((*key[:3], number), tuple(points), convergence(*columns)))
+            found.append(SweepLine((*key[:3], number), tuple(points), convergence(*columns)))
     return found
 
 

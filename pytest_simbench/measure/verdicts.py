@@ -34,7 +34,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Claim:
+class Bound:
     """The true mean is at least, or at most, a value."""
 
     relation: Literal["at least", "at most"]
@@ -44,14 +44,14 @@ class Claim:
         return f"{self.relation} {self.value:g}"
 
 
-def at_least(value: float) -> Claim:
+def at_least(value: float) -> Bound:
     """The claim that the true mean is `value` or more."""
-    return Claim("at least", value)
+    return Bound("at least", value)
 
 
-def at_most(value: float) -> Claim:
+def at_most(value: float) -> Bound:
     """The claim that the true mean is `value` or less."""
-    return Claim("at most", value)
+    return Bound("at most", value)
 
 
 def confidence(metric: Metric, error: float = ERROR) -> float:
@@ -73,7 +73,7 @@ class Judgement:
     """
 
     verdict: Verdict
-    claim: Claim
+    claim: Bound
     interval: Interval
     further: int | None = 0
 
@@ -96,7 +96,7 @@ class Judgement:
         return "the mean is too close to the threshold for any number of repetitions"
 
 
-def judge(claim: Claim, interval: Interval) -> Judgement:
+def judge(claim: Bound, interval: Interval) -> Judgement:
     """Supported when the whole interval fulfils the claim, refuted when none of it does.
 
     A value that was the same in all repetitions is judged as it is.

@@ -34,7 +34,7 @@ from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.motion.hulls import AXES, Cuts, with_hulls
 from pytest_simbench.motion.model import RobotModel
-from pytest_simbench.motion.table import Table
+from pytest_simbench.motion.table import FileTable
 from pytest_simbench.scene import Gripper, Joint, MotionLimits, Pose, Robot, Scene, SceneError
 from pytest_simbench.simulator import DescriptionError
 
@@ -69,7 +69,7 @@ def read_robot(path: str | Path) -> Robot:
     except (ValueError, RecursionError) as error:
         raise RobotError(f"{path} is no TOML file: {error}") from None
     try:
-        return _Reader(Table(data, str(path)), path.parent).read()
+        return _Reader(FileTable(data, str(path)), path.parent).read()
     except (DescriptionError, SceneError, FileError) as error:
         raise RobotError(f"{path}: {error}") from None
 
@@ -89,7 +89,7 @@ class _Hand(NamedTuple):
 class _Reader:
     """Reads one file, whose paths begin in `folder`."""
 
-    def __init__(self, table: Table, folder: Path) -> None:
+    def __init__(self, table: FileTable, folder: Path) -> None:
         self.table, self.folder = table, folder
         self.name = table.text("name")
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,40}", self.name) or self.name in ("all", "none"):
@@ -179,7 +179,7 @@ class _Reader:
         return str(Path(self.packages[package]) / rest)
 
     def _drives(
-        self, table: Table, names: Sequence[str], start: Sequence[float]
+        self, table: FileTable, names: Sequence[str], start: Sequence[float]
     ) -> tuple[Joint, ...]:
         _check_moving(table, "joints", names, self.moving)
         n = len(names)
@@ -195,7 +195,7 @@ class _Reader:
         limits = [self.moving.get(name) for name in names]
         return [0.0 if limit is None else float(limit.get(key, "0")) for limit in limits]
 
-    def _limits(self, arm: Table, names: Sequence[str]) -> MotionLimits:
+    def _limits(self, arm: FileTable, names: Sequence[str]) -> MotionLimits:
         n = len(names)
         acceleration = arm.each("acceleration", n, least=SMALLEST)
         return MotionLimits(
@@ -225,7 +225,7 @@ class _Reader:
             return _Hand(joints, gripper, panda.TOOL_FRAME, panda.LIMITS.finger_speed, mount)
         return self._own_hand(hand)
 
-    def _own_hand(self, hand: Table) -> _Hand:
+    def _own_hand(self, hand: FileTable) -> _Hand:
         """A hand in the robot's own URDF; one without joints only touches."""
         frame, tool = hand.text("tool_frame"), _pose(hand)
         if "joints" not in hand:
@@ -245,7 +245,7 @@ class _Reader:
         return _Hand(joints, Gripper(names, opened, closed, squeeze), frame, speed, tool=tool)
 
 
-def _pose(table: Table) -> Pose | None:
+def _pose(table: FileTable) -> Pose | None:
     """The pose that `xyz` and `rpy` give; None where neither is there."""
     if "xyz" not in table and "rpy" not in table:
         return None
@@ -261,7 +261,9 @@ def _moving(joints: Iterable[ET.Element]) -> dict[str, ET.Element | None]:
     }
 
 
-def _check_moving(table: Table, key: str, names: Iterable[str], moving: Collection[str]) -> None:
+def _check_moving(
+    table: FileTable, key: str, names: Iterable[str], moving: Collection[str]
+) -> None:
     for name in names:
         if name not in moving:
             known = ", ".join(moving) or "none"

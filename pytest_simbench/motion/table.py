@@ -11,7 +11,7 @@ from pytest_simbench.motion.errors import RobotError
 T = TypeVar("T")
 
 
-class Table:
+class FileTable:
     """One table of a file; `close` complains of what nobody took. Messages begin with `where`."""
 
     def __init__(self, data: Mapping[str, Any], where: str) -> None:
@@ -22,12 +22,12 @@ class Table:
     def __contains__(self, key: str) -> bool:
         return key in self._left
 
-    def table(self, key: str) -> Table:
+    def table(self, key: str) -> FileTable:
         """A table in this one, `[key]`; empty where there is none."""
         value = self._take(key, {})
         if not isinstance(value, dict):
             raise self.error(key, "make it a table, with its values below " + f"[{key}]")
-        return Table(value, f"{self.where}, [{key}]")
+        return FileTable(value, f"{self.where}, [{key}]")
 
     def text(self, key: str, default: str | None = None) -> str:
         """A text that is not empty."""
@@ -47,17 +47,17 @@ class Table:
 
     def names(self, key: str) -> dict[str, str]:
         """A table of texts."""
-        return self._each(key, Table.text)
+        return self._each(key, FileTable.text)
 
     def numbers(self, key: str) -> dict[str, float]:
         """A table of numbers."""
-        return self._each(key, Table.number)
+        return self._each(key, FileTable.number)
 
-    def tables(self, key: str) -> dict[str, Table]:
+    def tables(self, key: str) -> dict[str, FileTable]:
         """A table of tables."""
-        return self._each(key, Table.table)
+        return self._each(key, FileTable.table)
 
-    def _each(self, key: str, read: Callable[[Table, str], T]) -> dict[str, T]:
+    def _each(self, key: str, read: Callable[[FileTable, str], T]) -> dict[str, T]:
         inner = self.table(key)
         return {name: read(inner, name) for name in list(inner._left)}
 

@@ -21,7 +21,7 @@ from pytest_simbench.records.baseline import (
     read_baseline,
 )
 from pytest_simbench.records.configuration import other_meanings
-from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric, UnknownMetric
 from pytest_simbench.report.markdown.run import render_changes as render_markdown
 from pytest_simbench.report.terminal.parts import render_changes as render_terminal
@@ -41,13 +41,13 @@ class Comparison:
         beside: a simulator of this very run, and its other versions, that are compared with it.
     """
 
-    baseline: Reading
+    baseline: RunContents
     limits: Sequence[Limit] = ()
     beside: Beside | None = None
     typed: bool = False
     _report: GateReport | None = field(default=None, init=False)
 
-    def make(self, run: Reading) -> None:
+    def make(self, run: RunContents) -> None:
         """Compare with this run, which says what the metrics mean."""
         before, now = self.baseline.records, run.records
         if self.beside is not None:
@@ -100,7 +100,7 @@ def prepare(
     typed = options.given(config, "sim_compare_fail")
     beside = _beside(config, simulators)
     if beside is not None:
-        here = Reading(f"{beside[0]} in this run")
+        here = RunContents(f"{beside[0]} in this run")
         return Comparison(here, _limits(text, here, typed=False), beside, typed)
     with options.refusing(BaselineError):
         baseline = _baseline(config, saved, needed=typed)
@@ -127,7 +127,9 @@ def _beside(config: pytest.Config, names: Sequence[str]) -> Beside | None:
     return given, others
 
 
-def _baseline(config: pytest.Config, saved: list[dict[str, Any]], needed: bool) -> Reading | None:
+def _baseline(
+    config: pytest.Config, saved: list[dict[str, Any]], needed: bool
+) -> RunContents | None:
     given = options.value(config, "sim_baseline")
     if given:
         return read_baseline(Path(config.invocation_params.dir, given))
@@ -155,7 +157,7 @@ def _name(saved: Mapping[str, Any]) -> str:
     return f"the run saved {when} UTC" + (f", commit {commit}" if commit else "")
 
 
-def _limits(text: str | None, baseline: Reading, *, typed: bool) -> tuple[Limit, ...]:
+def _limits(text: str | None, baseline: RunContents, *, typed: bool) -> tuple[Limit, ...]:
     """The limits, each on a metric that the baseline has; none without a text.
 
     The ini file's hold for other runs too: what this baseline does not have is not compared, and

@@ -28,14 +28,14 @@ from pytest_simbench.plugin.history import folder_of, on_other_machines
 from pytest_simbench.plugin.resume import Resumed, folder_to_resume
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import Threshold
-from pytest_simbench.records.folder import Reading, RunFolder
+from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import NAME
 from pytest_simbench.report.files import write_badge, write_outcome, write_report
 from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.markdown.github import append_summary
-from pytest_simbench.report.model.outcome import Outcome
+from pytest_simbench.report.model.outcome import RunOutcome
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.terminal.progress import Progress
 from pytest_simbench.tasks.base import Task
@@ -61,7 +61,7 @@ class Run:
         self.folder = RunFolder(self._choose_path())
         self.problem: str = (self._shared_by or {}).get("simbench_problem", "")
         self.displays = Displays()
-        self.reading = Reading()
+        self.reading = RunContents()
         self.mistake = ""
         self.page: Path | None = None
         self.expected: Callable[[], Iterable[Experiment]] = tuple
@@ -285,7 +285,7 @@ class Run:
             reporter.write_sep("=", title)
             reporter.write_line(text)
         baseline, report = found or ("", None)
-        outcome = Outcome(passed, baseline, report, looks)
+        outcome = RunOutcome(passed, baseline, report, looks)
         problems.append(write_outcome(path, outcome))
         if badge := options.value(self.config, "sim_badge"):
             problems.append(write_badge(Path(badge), records, passed))
@@ -302,7 +302,7 @@ class Run:
         after a verdict was looked at again."""
         if self.resumed is None:
             return 1
-        before, _ = Outcome.read(self.folder.path)
+        before, _ = RunOutcome.read(self.folder.path)
         ended = [r for r in self.resumed.records if r.status != "interrupted"]
         added = len([r for r in self.reading.records if r.status != "interrupted"]) > len(ended)
         return before.looks + (before.passed is not None and added)

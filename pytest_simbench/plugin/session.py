@@ -232,9 +232,9 @@ class SimSession:
             self.run.judge(self._failed, self._passed)
             self.run.complete()
         if self.comparison is not None and self._alone:
-            from pytest_simbench.records.folder import Reading
+            from pytest_simbench.records.folder import RunContents
 
-            reading = self.run.reading if self.begun else Reading()
+            reading = self.run.reading if self.begun else RunContents()
             if reading.records or self.comparison.typed:
                 self.comparison.make(reading)
             if self.comparison.failed and session.exitstatus == pytest.ExitCode.OK:

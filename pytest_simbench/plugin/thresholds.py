@@ -12,7 +12,7 @@ import pytest
 
 from pytest_simbench.measure.limits import CRASHED, LimitError, check_gate, named
 from pytest_simbench.plugin import options
-from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.repeatability.stability import KEPT
 
@@ -37,7 +37,7 @@ def bad_value(given: Mapping[str, float], metrics: Iterable[Metric] = OF_EVERY_T
     return ""
 
 
-def problem(given: Mapping[str, float], run: Reading) -> str:
+def problem(given: Mapping[str, float], run: RunContents) -> str:
     """What is wrong with thresholds, once the tests have run; else nothing.
 
     Valid are the metrics of the tasks that were performed, the costs, `crashed`, and every name

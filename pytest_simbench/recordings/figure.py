@@ -41,7 +41,7 @@ class Mesh:
 
 
 @dataclass(frozen=True)
-class Part(Wire):
+class FigureShape(Wire):
     """One shape of a link, at `pose` in its frame: a box of edge lengths `size` [m], or a mesh by
     its place in `Figure.meshes`."""
 
@@ -69,7 +69,7 @@ class Figure(Wire):
     name: str
     root: str
     hinges: Sequence[MovingJoint]
-    parts: Sequence[Part]
+    parts: Sequence[FigureShape]
     urdf: str
     meshes: Sequence[Mesh] = ()
 
@@ -89,7 +89,7 @@ class Figure(Wire):
             prepared.root,
             [replace(joint, axis=_unit(joint.axis)) for joint in prepared.joints],
             [
-                Part(name, s.pose, s.size, None if s.mesh is None else paths.index(s.mesh))
+                FigureShape(name, s.pose, s.size, None if s.mesh is None else paths.index(s.mesh))
                 for name, s in shapes
             ],
             _without_meshes(prepared.to_urdf()),

@@ -15,7 +15,7 @@ from typing import Any
 
 from pytest_simbench.records.checked import CheckError
 from pytest_simbench.records.description import TaskDescription
-from pytest_simbench.records.folder import RECORDS, Reading, RunFolder
+from pytest_simbench.records.folder import RECORDS, RunContents, RunFolder
 from pytest_simbench.records.record import SCHEMA, Record, RecordError
 from pytest_simbench.records.series import settled
 
@@ -30,7 +30,7 @@ class BaselineError(ValueError):
     """A baseline that cannot be used; the message says why and what would be one."""
 
 
-def read_baseline(path: Path) -> Reading:
+def read_baseline(path: Path) -> RunContents:
     """The run at `path`.
 
     Raises:
@@ -61,7 +61,7 @@ def _benchmark_file(path: Path) -> dict[str, Any] | None:
     return data if isinstance(data, dict) and "benchmarks" in data else None
 
 
-def from_benchmarks(saved: Mapping[str, Any], name: str) -> Reading:
+def from_benchmarks(saved: Mapping[str, Any], name: str) -> RunContents:
     """The run in the content of a pytest-benchmark file; benchmarks of other tests are left out.
 
     Raises:
@@ -88,7 +88,7 @@ def from_benchmarks(saved: Mapping[str, Any], name: str) -> Reading:
             f"the baseline {name} holds no repetition of a simulator that this version can "
             f"compare; give {FORMS}"
         )
-    return Reading(name, tuple(settled(records)), tasks, problems=tuple(problems))
+    return RunContents(name, tuple(settled(records)), tasks, problems=tuple(problems))
 
 
 def _tasks(data: Mapping[str, Any], where: str, problems: list[str]) -> dict[str, TaskDescription]:

@@ -24,7 +24,7 @@ with. `merge`: in runs that are merged. `compare`: named before a comparison wit
 
 
 @dataclass(frozen=True)
-class Part:
+class ConfigurationField:
     """One field of a record.
 
     Attributes:
@@ -38,13 +38,13 @@ class Part:
     reason: str
 
 
-def _part(name: str, uses: str, reason: str) -> Part:
-    return Part(name, frozenset(uses.split()), reason)  # type: ignore[arg-type]
+def _part(name: str, uses: str, reason: str) -> ConfigurationField:
+    return ConfigurationField(name, frozenset(uses.split()), reason)  # type: ignore[arg-type]
 
 
 EVERYWHERE = "pool resume merge compare"
 
-PARTS: tuple[Part, ...] = (
+PARTS: tuple[ConfigurationField, ...] = (
     # What is repeated: records are found by these, so they never differ within a group.
     _part("test", "twin", "tells groups apart; merged runs may have it under another path"),
     _part("function", "", "follows from the test"),
@@ -97,7 +97,7 @@ PARTS: tuple[Part, ...] = (
     _part("extra", "", "of a newer plugin: not known what it means"),
 )  # fmt: skip
 
-MEANING: tuple[Part, ...] = (
+MEANING: tuple[ConfigurationField, ...] = (
     _part("name", "", "tells metrics apart"),
     _part("unit", "resume merge compare", "metres and millimetres are no series"),
     _part("kind", "resume merge compare", "a share and a length are no series"),
@@ -155,7 +155,7 @@ def field_of(key: str) -> str:
     return key.partition(".")[0]
 
 
-class Told(NamedTuple):
+class ToldConfiguration(NamedTuple):
     """What a record tells of its configuration.
 
     Attributes:
@@ -171,10 +171,10 @@ class Told(NamedTuple):
     parts: tuple[Any, ...]
 
     @classmethod
-    def of(cls, record: Record, use: Use = "pool") -> Told:
+    def of(cls, record: Record, use: Use = "pool") -> ToldConfiguration:
         """Of records that were read together most share these fields, so it is found out once for
         all of them; and each record keeps it."""
-        kept: dict[str, Told] = vars(record).setdefault("_told", {})
+        kept: dict[str, ToldConfiguration] = vars(record).setdefault("_told", {})
         if use not in kept:
             parts = tuple(getattr(record, name) for name in equal_to(use))
             same = (repr(p) if isinstance(p, str | int | float | None) else id(p) for p in parts)
@@ -189,7 +189,7 @@ class Told(NamedTuple):
             kept[use] = _found[key]
         return kept[use]
 
-    def agrees(self, other: Told) -> bool:
+    def agrees(self, other: ToldConfiguration) -> bool:
         """Whether nothing known contradicts that both are of one configuration."""
         a, b = self.values, other.values
         return a is b or all(
@@ -200,13 +200,13 @@ class Told(NamedTuple):
         )
 
 
-_found: dict[tuple[Any, ...], Told] = {}
+_found: dict[tuple[Any, ...], ToldConfiguration] = {}
 _MOST_FOUND = 1000
 
 
 def agree(first: Record, second: Record, use: Use = "pool") -> bool:
     """Whether nothing known contradicts that both are of one configuration."""
-    return Told.of(first, use).agrees(Told.of(second, use))
+    return ToldConfiguration.of(first, use).agrees(ToldConfiguration.of(second, use))
 
 
 def text(value: Any) -> str:
@@ -279,7 +279,9 @@ def _unknown(records: Sequence[Record], key: str) -> bool:
 def _each_value(records: Sequence[Record], use: Use) -> dict[str, list[str]]:
     """The different values of each key in a set of records, as JSON, sorted."""
     found: dict[str, set[str]] = {}
-    for told in {id(told): told for told in (Told.of(record, use) for record in records)}.values():
+    for told in {
+        id(told): told for told in (ToldConfiguration.of(record, use) for record in records)
+    }.values():
         for key, value in told.values.items():
             found.setdefault(key, set()).add(value)
     return {key: sorted(known) for key, known in found.items()}

@@ -43,7 +43,7 @@ NOUNS = {RECORDS: "record", TASKS: "task description", THRESHOLDS: "threshold", 
 
 
 @dataclass(frozen=True)
-class Reading:
+class RunContents:
     """What a run holds.
 
     Attributes:
@@ -206,7 +206,7 @@ class RunFolder:
             self._files[name] = LinesFile(self.path, name, self._spare, noun)
         self._files[name].append(line)
 
-    def read(self) -> Reading:
+    def read(self) -> RunContents:
         """What the folder holds. Damaged lines are left out, each with a problem.
 
         Raises:
@@ -219,7 +219,7 @@ class RunFolder:
             raise RecordError(damaged[0].replace(DAMAGED, ""))
         return found
 
-    def scan(self) -> Reading:
+    def scan(self) -> RunContents:
         """The same, with what is wrong told instead of raised."""
         path = self.path / self._records
         try:
@@ -233,7 +233,7 @@ class RunFolder:
         tasks = {**self._tasks(problems), **self._described}
         asked = dict.fromkeys([*self._parsed(THRESHOLDS, Threshold, problems), *self._asked])
         claims = (*self._parsed(CLAIMS, Claim, problems), *self._claims)
-        return Reading(
+        return RunContents(
             name=str(self.path if self._records == RECORDS else path),
             records=tuple(records),
             tasks=tasks,

@@ -28,7 +28,7 @@ GROWTH_TIMES = ("1", "5", "20")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Difference:
+class StateDifference:
     """How two runs of the same commands part; nothing is set where every bit is the same.
 
     Attributes:
@@ -53,7 +53,7 @@ class Difference:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Again(Difference):
+class Again(StateDifference):
     """One way of running again, and where it parted from the first run.
 
     Attributes:

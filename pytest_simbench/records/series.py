@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeVar
 
 from pytest_simbench.ground.versions import VersionedName, release_numbers
 from pytest_simbench.records.configuration import (
-    Told,
+    ToldConfiguration,
     Use,
     agree,
     equal_to,
@@ -58,7 +58,7 @@ def configurations(records: Iterable[Record]) -> list[list[Record]]:
     records = list(records)
     groups: list[list[int]] = []
     # Those that know everything come first: the others are compared with them.
-    facts = [Told.of(record) for record in records]
+    facts = [ToldConfiguration.of(record) for record in records]
     for place in sorted(range(len(records)), key=lambda k: not records[k].ok):
         for group in groups:
             if facts[group[0]].agrees(facts[place]):
@@ -192,7 +192,10 @@ def comparable(a: Series, b: Series) -> bool:
 def told(records: Sequence[Record], use: Use = "pool") -> dict[str, object]:
     """What the records of one configuration say of it together."""
     found: dict[str, object] = {}
-    ordered = (Told.of(record, use).plain for record in sorted(records, key=lambda r: not r.ok))
+    ordered = (
+        ToldConfiguration.of(record, use).plain
+        for record in sorted(records, key=lambda r: not r.ok)
+    )
     for each in {id(each): each for each in ordered}.values():
         for key, value in each.items():
             found.setdefault(key, value)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pytest_simbench.client.world import Motion
-from pytest_simbench.records.repeatability import GROWTH_TIMES, Difference
+from pytest_simbench.records.repeatability import GROWTH_TIMES, StateDifference
 from pytest_simbench.scene import FloatArray
 
 
@@ -85,7 +85,7 @@ def _at(clock: FloatArray, before: Motion, motion: Motion) -> FloatArray:
 
 def difference(
     first: Sequence[Motion], second: Sequence[Motion], bodies: Sequence[str]
-) -> Difference:
+) -> StateDifference:
     """How two runs in one simulator part, sampled bit by bit.
 
     Args:
@@ -94,10 +94,10 @@ def difference(
     """
     found = _first_difference(first, second)
     if found is None:
-        return Difference()
+        return StateDifference()
     time, body = found
     between = gaps(first, second)
-    return Difference(
+    return StateDifference(
         first=time,
         body="" if body is None else bodies[body],
         growth={after: between.after(time + float(after)) for after in GROWTH_TIMES},

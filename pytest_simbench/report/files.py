@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pytest_simbench.ground.text import for_csv, for_terminal
-from pytest_simbench.records.folder import Reading, RunFolder
+from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
@@ -20,7 +20,7 @@ from pytest_simbench.report.markdown.github import badge
 from pytest_simbench.report.markdown.run import render_run, render_tables
 from pytest_simbench.report.model.document import Table
 from pytest_simbench.report.model.outcome import NAME as OUTCOME
-from pytest_simbench.report.model.outcome import Compared, Outcome
+from pytest_simbench.report.model.outcome import Compared, RunOutcome
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import PHASES
 from pytest_simbench.report.page import PAGE_NAME
@@ -55,7 +55,7 @@ class Written(Report):
 
 def write_report(
     folder: RunFolder,
-    reading: Reading | None = None,
+    reading: RunContents | None = None,
     comparison: Compared | None = None,
     looks: int = 1,
 ) -> Written:
@@ -153,7 +153,7 @@ def shown(path: Path, base: Path) -> Path:
     return path.relative_to(base) if path.is_relative_to(base) else path
 
 
-def write_outcome(folder: Path, outcome: Outcome) -> str:
+def write_outcome(folder: Path, outcome: RunOutcome) -> str:
     """Keep how a run ended in its folder; a sentence when it could not be written."""
     try:
         outcome.write(folder)

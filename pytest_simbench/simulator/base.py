@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.description.carried import Carried
+from pytest_simbench.description.links import check_apart
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.ground.errors import NotSupportedError
-from pytest_simbench.records.choices import Seen
+from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.scene import FloatArray, Scene, Vector3
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.settings import Settings
@@ -118,6 +119,7 @@ class Simulator(ABC):
         """Have `scene` and `prepared`, and no steps so far; for `load` to call first."""
         self.scene, self._steps = scene, 0
         self.prepared = None if scene.robot is None else PreparedRobot(scene.robot)
+        check_apart(scene, self.prepared)
 
     def read_file(self, path: str) -> tuple[Scene, tuple[Carried, ...]]:
         """A file of the engine's own format as a scene, and what was carried of it.

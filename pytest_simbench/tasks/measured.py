@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any, ClassVar, Generic, TypeVar
 
-from pytest_simbench.data.measured import Measured, Motion
+from pytest_simbench.data.measured import Measured, MeasuredMotion
 from pytest_simbench.tasks.base import Task
 
-M = TypeVar("M", bound=Motion)
+M = TypeVar("M", bound=MeasuredMotion)
 
 
 class MeasuredTask(Task, Generic[M]):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from pytest_simbench.description.stl import written_stl
 from pytest_simbench.scene import (
     Box,
     Capsule,
+    Compound,
     ConvexMesh,
     Cylinder,
     FloatArray,
@@ -84,15 +85,23 @@ def true_scene() -> Scene:
         Box("belt", (0.5, 0.2, 0.1), Pose.at(-0.6, 0.5, 0.3, yaw=0.2),
             linear_velocity=(0.3, 0.0, 0.0), prescribed=True),
         Cylinder("pillar", 0.04, 0.2, Pose.at(0.5, -0.6, 0.1)),
+        Compound("stool", _stool(), Pose.at(-0.5, -0.5, 0.5, yaw=0.4), 0.5,
+                 moments=(1.0e-3, 1.2e-3, 1.1e-3), friction=0.7),
     )  # fmt: skip
     return Scene(
         "full",
-        tuple(replace(body, friction=0.7) for body in bodies),
+        tuple(body.with_friction(0.7) for body in bodies),
         robot=replace(scenes.arm(), friction=0.7),
         gravity=(0.3, -0.2, -3.7),
         ground_friction=0.7,
         ground_restitution=0.6,
     )
+
+
+def _stool(aside: float = 0.0) -> tuple[Box, Box]:
+    """Foot and back of a body of two shapes, the back `aside` of its place [m]."""
+    back = Box("back", (0.02, 0.1, 0.1), Pose.at(0.03, aside, 0.01, yaw=0.3), friction=0.7)
+    return Box("foot", (0.1, 0.1, 0.02), Pose.at(0.0, 0.0, -0.05), friction=0.7), back
 
 
 def of_scene(**values: Any) -> Plant:
@@ -218,8 +227,8 @@ def _text(values: FloatArray) -> str:
 
 
 def robot_faults(robot: Robot) -> dict[str, Fault]:
-    """Faults of the middle joint of an arm, of the link that it moves, of the base and the fingers.
-    No two concern one quantity, so one world holds them all."""
+    """Faults of the middle joint of an arm, of the link that it moves, of the base and the
+    fingers."""
     first, middle = robot.arm_joints[0].name, robot.arm_joints[len(robot.arm_joints) // 2].name
     children = {joint.name: joint.child for joint in PreparedRobot(robot).joints}
     moved, fingers = children[middle], robot.gripper.joints
@@ -280,6 +289,9 @@ _ROWS: dict[str, tuple[Any, ...]] = {
                    edited(f"{_LINK4}/collision/geometry/mesh", _scaled)),
     "inertia_turned": ("the inertia of link 4 is turned by 90 degrees", "link/panda_link4/inertia",
                        edited(f"{_LINK4}/inertial/inertia", _turned_inertia)),
+    "inertia_product": ("the inertia of link 6 has no products", "link/panda_link6/inertia",
+                        edited("link[@name='panda_link6']/inertial/inertia",
+                               put(ixy="0", ixz="0", iyz="0"))),
     "self_collide": ("the robot's links collide with each other", "link/panda_link4/touches",
                      of_robot(lambda robot: replace(robot, self_collide=True)),
                      Capability.SELF_COLLIDE),
@@ -300,6 +312,10 @@ _ROWS: dict[str, tuple[Any, ...]] = {
     "wedge_is_a_box": ("the wedge is the box around it", "body/wedge/meshes",
                        lambda scene: scene.with_body(
                            Box("wedge", scene.body("wedge").extents, LEANING, 0.15, 0.7))),
+    "compound_pose": ("the back of the stool is 5 mm aside", "body/stool/boxes",
+                      of_body("stool", shapes=_stool(0.005)), Capability.COMPOUND),
+    "compound_inertia": ("the stool's moments of inertia are exchanged", "body/stool/inertia",
+                         of_body("stool", moments=(1.2e-3, 1.0e-3, 1.1e-3)), Capability.COMPOUND),
     "restitution": ("the ball bounces less", "body/ball/restitution",
                     of_body("ball", restitution=0.55)),
     "ground_restitution": ("the ground bounces less", "ground/restitution",
@@ -335,14 +351,16 @@ FAULTS: dict[str, Fault] = {
 """By short names."""
 
 
-def rounds(capabilities: Collection[Capability]) -> list[dict[str, Fault]]:
-    """`FAULTS` of an engine in as few worlds as there are of one quantity: worlds may be dear to
+def rounds(
+    capabilities: Collection[Capability], faults: Mapping[str, Fault] = FAULTS
+) -> list[dict[str, Fault]]:
+    """The faults of an engine in as few worlds as there are of one quantity: worlds may be dear to
     build.
 
     No two of a round concern one quantity, so each must be seen beside the others.
     """
     found: list[dict[str, Fault]] = []
-    possible = (item for item in FAULTS.items() if item[1].needs in (None, *capabilities))
+    possible = (item for item in faults.items() if item[1].needs in (None, *capabilities))
     for name, fault in possible:
         for group in found:
             if fault.quantity not in {other.quantity for other in group.values()}:

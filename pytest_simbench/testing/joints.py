@@ -1,5 +1,5 @@
-"""Checks of what a joint does by itself (damping, friction, a spring), of joints that move together
-and of pairs that are kept apart."""
+"""Checks of what a joint does by itself (damping, friction, a spring, its rotor), of links that are
+held together, of joints that move together and of pairs that are kept apart."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pytest_simbench.laws.mechanisms import STRONG, Part, Y, mechanism
 from pytest_simbench.scene import (
     STANDARD_GRAVITY,
     Box,
+    Closure,
     Coupling,
     FloatArray,
     Pose,
@@ -85,21 +86,23 @@ def moves(subject: Subject, robot: Robot) -> tuple[FloatArray, FloatArray]:
     return motion.time, motion.joints[:, 0]
 
 
-def moves_by(subject: Subject, part: Part, law: Acceleration) -> None:
-    """One part on its joint moves as the law says, within 2 % of its way and two steps' travel."""
-    time, positions = moves(subject, mechanism(part.name, part))
+def moves_by(
+    subject: Subject, *parts: Part, law: Acceleration, rotor: float = 0.0, **held: Any
+) -> FloatArray:
+    """The first part moves as the law says, within 2 % of its way and two steps' travel; positions
+    of all, (n, n_parts). `rotor`: armature of that part's joint; `held`: see `mechanism`."""
+    robot, part = mechanism(parts[0].name, *parts, **held), parts[0]
+    if rotor:
+        robot = scenes.with_joint(robot, part.name, armature=rotor)
+    time, positions = moves(subject, robot)
     right = followed(law, time)
-    allowed = _allowed(subject, time, right)
+    fastest = float(np.abs(np.gradient(right, time)).max())
+    allowed = 0.02 * float(np.ptp(right)) + 2 * subject.timestep * fastest
     worst = int(np.abs(positions[:, 0] - right).argmax())
     what = f"position of {part.name} after {time[worst]:.2f} s"
     unit = "m" if part.slides else "rad"
     require_close(what, float(positions[worst, 0]), float(right[worst]), allowed, unit)
-
-
-def _allowed(subject: Subject, time: FloatArray, right: FloatArray) -> float:
-    """2 % of the way, and the travel of two steps [rad or m]."""
-    fastest = float(np.abs(np.gradient(right, time)).max())
-    return 0.02 * float(np.ptp(right)) + 2 * subject.timestep * fastest
+    return positions
 
 
 def held(subject: Subject, part: Part) -> None:
@@ -120,10 +123,10 @@ def joints_are_damped(subject: Subject) -> None:
     as the equation of motion says, though the drive's effort limit is next to nothing."""
     declared(subject, "passive_damping")
     moves_by(
-        subject, slider("damped slider", passive_damping=20.0), lambda q, v: -G - 20 * v / MASS
+        subject, slider("damped slider", passive_damping=20.0), law=lambda q, v: -G - 20 * v / MASS
     )
     damped = lever("damped lever", passive_damping=1.0)
-    moves_by(subject, damped, lambda q, v: (turning(q) - v) / ABOUT_AXIS)
+    moves_by(subject, damped, law=lambda q, v: (turning(q) - v) / ABOUT_AXIS)
 
 
 @check()
@@ -134,11 +137,11 @@ def joints_have_friction(subject: Subject) -> None:
     weight, torque = MASS * G, MASS * G * LEVER
     held(subject, slider("held slider", friction=1.25 * weight))
     held(subject, lever("held lever", friction=1.25 * torque))
-    moves_by(subject, slider("braked slider", friction=0.6 * weight), lambda q, v: -0.4 * G)
+    moves_by(subject, slider("braked slider", friction=0.6 * weight), law=lambda q, v: -0.4 * G)
     moves_by(
         subject,
         lever("braked lever", friction=0.6 * torque),
-        lambda q, v: max(turning(q) - 0.6 * torque, 0.0) / ABOUT_AXIS,
+        law=lambda q, v: max(turning(q) - 0.6 * torque, 0.0) / ABOUT_AXIS,
     )
 
 
@@ -148,13 +151,13 @@ def joints_have_springs(subject: Subject) -> None:
     weight; a lever likewise. A drive as stiff that holds 0 doubles stiffness and halves the way."""
     declared(subject, "spring")
     part = slider("sprung slider", spring=200.0, rest=0.1)
-    moves_by(subject, part, lambda q, v: -G + 200 * (0.1 - q) / MASS)
+    moves_by(subject, part, law=lambda q, v: -G + 200 * (0.1 - q) / MASS)
     part = lever("sprung lever", spring=20.0, rest=-0.4)
-    moves_by(subject, part, lambda q, v: (turning(q) + 20 * (-0.4 - q)) / ABOUT_AXIS)
+    moves_by(subject, part, law=lambda q, v: (turning(q) + 20 * (-0.4 - q)) / ABOUT_AXIS)
     driven = slider("driven slider", spring=200.0, rest=0.1, stiffness=200.0, effort=STRONG)
     excused = subject.cls.info.deviations
     if not any(d.excuses(f"joint/{driven.name}/stiffness") for d in excused):
-        moves_by(subject, driven, lambda q, v: -G + (200 * (0.1 - q) - 200 * q) / MASS)
+        moves_by(subject, driven, law=lambda q, v: -G + (200 * (0.1 - q) - 200 * q) / MASS)
 
 
 @check(Capability.COUPLINGS)
@@ -162,25 +165,43 @@ def joints_move_together(subject: Subject) -> None:
     """A lever falls and turns another one, -0.5 times as far and from 0.2 rad: within 5 mrad, and
     as fast as both inertias let it (2 %)."""
     pair = Coupling("turned", "falling", -0.5, 0.2)
-    robot = mechanism(
-        "coupled levers",
-        lever("falling"),
-        lever("turned", (0.0, 0.5, 0.0), start=0.2),
-        couplings=(pair,),
-    )
-    time, positions = moves(subject, robot)
-    apart = positions[:, 1] - (pair.ratio * positions[:, 0] + pair.offset)
-    require_close("gap of the coupled joints", float(np.abs(apart).max()), 0.0, 5e-3, "rad")
+    turned = lever("turned", (0.0, 0.5, 0.0), start=0.2)
 
     def law(q: float, v: float) -> float:
         torque = turning(q) + pair.ratio * turning(pair.ratio * q + pair.offset)
         return torque / (ABOUT_AXIS * (1 + pair.ratio**2))
 
-    right = followed(law, time)
-    allowed = _allowed(subject, time, right)
-    worst = int(np.abs(positions[:, 0] - right).argmax())
-    what = f"position of the falling lever after {time[worst]:.2f} s"
-    require_close(what, float(positions[worst, 0]), float(right[worst]), allowed, "rad")
+    positions = moves_by(subject, lever("falling"), turned, law=law, couplings=(pair,))
+    apart = positions[:, 1] - (pair.ratio * positions[:, 0] + pair.offset)
+    require_close("gap of the coupled joints", float(np.abs(apart).max()), 0.0, 5e-3, "rad")
+
+
+@check(Capability.LOOPS)
+def welded_links_are_one(subject: Subject) -> None:
+    """A lever on a lever, held to it at three points that are on no line: both swing as one body,
+    the joint between them within 5 mrad."""
+    upper = lever("upper")
+    lower = Part("lower", Y, (2 * LEVER, 0.0, 0.0), (LEVER, 0.0, 0.0), inertia=INERTIA)
+    spots = ((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0))
+    weld = tuple(
+        Closure(upper.link, lower.link, (x + 2 * LEVER, y, z), (x, y, z)) for x, y, z in spots
+    )
+    both = 2 * INERTIA[1] + MASS * (LEVER**2 + (3 * LEVER) ** 2)
+    positions = moves_by(
+        subject, upper, lower, law=lambda q, v: 4 * turning(q) / both, closures=weld
+    )
+    require_close("turn of welded links", float(np.abs(positions[:, 1]).max()), 0.0, 5e-3, "rad")
+
+
+@check()
+def rotors_are_heavy(subject: Subject) -> None:
+    """With a rotor as heavy as the mass on it a slider falls half as fast. Skipped where an adapter
+    declares that it has none."""
+    part = slider("geared slider")
+    for deviation in subject.cls.info.deviations:
+        if deviation.excuses(f"joint/{part.name}/armature"):
+            pytest.skip(deviation.reason)
+    moves_by(subject, part, law=lambda q, v: -G / 2, rotor=MASS)
 
 
 @check(Capability.APART)

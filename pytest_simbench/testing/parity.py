@@ -14,7 +14,7 @@ from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import any_robot, check
 from pytest_simbench.testing.contract import SINGLE
-from pytest_simbench.testing.faults import Fault, robot_faults, rounds, true_scene
+from pytest_simbench.testing.faults import FAULTS, Fault, robot_faults, rounds, true_scene
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require
 
@@ -26,9 +26,21 @@ def parity_of_full_scene(subject: Subject) -> None:
         pass  # loading checks parity
 
 
+@check(Capability.SELF_COLLIDE, any_robot)
+def parity_where_links_collide(subject: Subject) -> None:
+    """The robot alone passes parity where its links collide with each other, but for those that one
+    joint joins, also where some of them overlap."""
+    with subject.world(Scene("colliding", robot=replace(subject.arm, self_collide=True))):
+        pass  # loading checks parity
+
+
 def _truth(subject: Subject) -> Scene:
-    """The kit's full scene with the robot that the laws are asked with."""
-    return replace(true_scene(), robot=replace(subject.arm, friction=0.7))
+    """The kit's full scene with the robot that the laws are asked with, and no body of several
+    shapes where an engine has none."""
+    scene = true_scene()
+    if not subject.can(Capability.COMPOUND):
+        scene = replace(scene, bodies=tuple(b for b in scene.bodies if len(b.parts) == 1))
+    return replace(scene, robot=replace(subject.arm, friction=0.7))
 
 
 @check(robot=any_robot)
@@ -75,10 +87,11 @@ def planted_faults_are_seen(subject: Subject) -> None:
     """
     missed = []
     robot, capabilities = subject.robot, subject.cls.info.capabilities
-    for faults in [robot_faults(robot)] if robot else rounds(capabilities):
+    lacking = [deviation for deviation in subject.cls.info.deviations if deviation.only]
+    for faults in rounds(capabilities, robot_faults(robot) if robot else FAULTS):
         found = planted(subject, faults.values())
         for name, fault in faults.items():
-            if any(fault.word and fault.word == d.only for d in subject.cls.info.deviations):
+            if any(fault.word == d.only and d.within is None for d in lacking):
                 continue
             if fault.quantity not in found.wrong and fault.quantity not in found.untold:
                 missed.append(f"{name} ({fault.what}): {fault.quantity} equals the true scene's")
@@ -95,6 +108,6 @@ def planted(subject: Subject, faults: Iterable[Fault]) -> ParityResult:
     return compare(
         expected_quantities(truth, subject.settings),
         reported,
-        subject.cls.info.deviations,
+        [deviation for deviation in subject.cls.info.deviations if deviation.concerns(truth)],
         subject.name,
     )

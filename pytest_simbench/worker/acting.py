@@ -24,7 +24,10 @@ class Acting:
         self._pushes = any(self._wrenches)
         self._led = scene.prescribed_bodies
         self._acts = True
-        self._act(0)  # nothing has moved yet; who takes neither says so now
+        # Who takes neither says so now. Without force: engines add up what acts before a step.
+        if self._pushes:
+            simulator.push(np.zeros((len(self._wrenches), 6)))
+        self._lead(0.0)
 
     @classmethod
     def of(cls, simulator: Simulator, scene: Scene) -> Acting | None:
@@ -52,7 +55,11 @@ class Acting:
             if acts or self._acts:
                 self.simulator.push(rows)
             self._acts = acts
+        self._lead(begin)
+
+    def _lead(self, begin: float) -> None:
         if self._led:
+            end = begin + self.simulator.settings.timestep
             self.simulator.lead(
                 np.array([prescribed(body, begin) for body in self._led]),
                 np.array([prescribed(body, end) for body in self._led]),

@@ -5,7 +5,8 @@ solved together with the contacts. Each step they are told the velocity v* + `po
 (q* - timestep v* - q) / timestep, as Gazebo's ros2_control does it (its gain is 0.1). DART's
 other drive, spring and damper with a rest position, is implicit too but knows no effort limit,
 and contact impulses do not feel its damping: at rest against a contact only m / (m + timestep d)
-of the spring's force arrives, a quarter for a finger. So it is not used.
+of the spring's force arrives, a quarter for a finger. So it is no drive, and only what joints have
+of their own.
 
 What was learnt stands in docs/engines/dart.md.
 """
@@ -24,6 +25,7 @@ from pytest_simbench.simulator import (
     FOLLOWER,
     Capability,
     Deviation,
+    NotSupportedError,
     PreparedRobot,
     Simulator,
     SimulatorInfo,
@@ -31,6 +33,7 @@ from pytest_simbench.simulator import (
 )
 
 from .bodies import ONE_CONTACT_ON_A_PLANE, add_body, add_ground, set_surface
+from .couplings import Couplings
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, DARTSettings
 
@@ -56,8 +59,8 @@ class DART(Simulator):
         oldest_version="6.20.0",  # older ones have neither the detector nor the solver of `tuned`
         friction_rule="minimum",
         capabilities=Capability.named(
-            "window save_restore contact_count contact_forces compound loops self_collide "
-            "joint_wrenches deterministic"
+            "window save_restore contact_count contact_forces compound loops couplings apart "
+            "self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("joint/*/armature", "DART has no rotor inertia"),
@@ -91,6 +94,11 @@ class DART(Simulator):
             Deviation(
                 "", "the coupling is one-way: the first finger does not feel the second's load"
             ),
+            Deviation(
+                "coupling/*",
+                "the adapter couples joints by impulses before a step; DART knows nothing of it",
+                only="coupling",
+            ),
         ),
         install_size_mb=80,
     )
@@ -108,9 +116,13 @@ class DART(Simulator):
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         self._robot: Any = None
+        self._couplings: Couplings | None = None
         self._base = np.empty(0)
         if self.prepared is not None:
             self._load_robot(self.prepared)
+        kept = self.world.getConstraintSolver().getCollisionOption().collisionFilter
+        for pair in scene.apart:
+            kept.addBodyNodePairToBlackList(*map(self._body_node, pair))
         self._viewer = self._open_window() if self.gui else None
 
     def _set_options(self, world: Any, scene: Scene) -> None:
@@ -160,6 +172,10 @@ class DART(Simulator):
                 limit *= 2
             else:
                 joint.setActuatorType(dynamics.ActuatorType.SERVO)
+            joint.setDampingCoefficient(0, drive.passive_damping)
+            joint.setCoulombFriction(0, drive.friction)
+            joint.setSpringStiffness(0, drive.spring)
+            joint.setRestPosition(0, drive.rest)
             joint.setForceUpperLimit(0, limit)
             joint.setForceLowerLimit(0, -limit)
             # a servo keeps its velocity limit; the scene's drive law has none, no other engine does
@@ -170,6 +186,8 @@ class DART(Simulator):
         driven = np.array([name not in followers for name in robot.joint_names])
         self._gain = driven * (self.settings.position_gain / self.settings.timestep)
         self._share = driven * (1 - self.settings.position_gain)
+        if robot.couplings:
+            self._couplings = Couplings(skeleton, names, robot.couplings)
         initial = robot.column("initial_position")
         skeleton.setPositions(list(self._index), initial)
         self.world.addSkeleton(skeleton)
@@ -209,6 +227,8 @@ class DART(Simulator):
 
     def step(self) -> None:
         if self._robot is not None:
+            if self._couplings is not None:
+                self._couplings.push()
             self._robot.setCommands(self._base - self._error_gain * self._robot.getPositions())
         self.world.step(False)
 
@@ -257,6 +277,13 @@ class DART(Simulator):
             force = np.asarray(contact.force)
             yield first, second, np.concatenate([force, np.cross(contact.point, force)])
 
+    def _body_node(self, name: str) -> Any:
+        """Of "ground", `body/NAME` or `link/NAME`."""
+        kind, _, rest = name.partition("/")
+        if kind == "link":
+            return self._robot.getBodyNode(rest)
+        return self._bodies[rest] if rest else self._ground
+
     def _name_of(self, body: Any) -> str:
         owner = body.getSkeleton().getName()
         if self._robot is not None and owner == self._robot.getName():
@@ -264,6 +291,8 @@ class DART(Simulator):
         return owner if owner == "ground" else f"body/{owner}"
 
     def joint_wrenches(self) -> FloatArray:
+        if self._couplings is not None:
+            raise NotSupportedError("dart tells no wrenches of joints that are coupled")
         rows = []
         for joint in self._joints():
             body = joint.getChildBodyNode()

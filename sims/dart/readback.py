@@ -7,6 +7,7 @@ with a collision detector (FCL, exact) that the world does not use.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,9 @@ class ReadBack(readback.ReadBack):
         links = {body.getName(): body for body in links}
         super().__init__(simulator, simulator._ground, simulator._bodies, links)
         self.detector = dartpy.collision.FCLCollisionDetector()
+        self.toucher = dartpy.collision.OdeCollisionDetector()
+        self.objects: dict[Any, list[Any]] = {}
+        self.groups: list[Any] = []
         self.probe = dartpy.dynamics.SimpleFrame(dartpy.dynamics.Frame.World(), "probe")
         self.probe.setShape(dartpy.dynamics.BoxShape(np.full(3, _PROBE)))
 
@@ -99,13 +103,17 @@ class ReadBack(readback.ReadBack):
     def joint(self, name: str) -> dict[str, Any]:
         joint = self.robot.getJoint(name)
         forces = [-joint.getForceLowerLimit(0), joint.getForceUpperLimit(0)]
-        passive = joint.getCoulombFriction(0) + joint.getDampingCoefficient(0)
+        passive = {
+            "passive_damping": joint.getDampingCoefficient(0),
+            "spring": joint.getSpringStiffness(0),
+        }
+        stray = sum(value for word, value in passive.items() if word not in self.scene.words)
         limits = [joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0)]
         return {
             "axis": np.ravel(joint.getRelativeJacobian()),
             "limits": limits if joint.areLimitsEnforced() else [-np.inf, np.inf],
             "effort_limit": one_value(forces),
-            "friction": passive + joint.getSpringStiffness(0),  # all that is not the servo's
+            "friction": joint.getCoulombFriction(0) + stray,  # all that is not the servo's
             "initial_position": joint.getPosition(0),
         }
 
@@ -127,16 +135,27 @@ class ReadBack(readback.ReadBack):
         return np.array(reaches) + directions @ (centre - place.translation())
 
     def collide(self, first: Any, second: Any) -> Any:
-        """Of two bodies as wholes."""
-        shapes = [*_colliding(first), *_colliding(second)]
-        able = all(shape.getCollisionAspect().isCollidable() for shape in shapes)
-        able = able and first.isCollidable() and second.isCollidable()
-        if first.getSkeleton() is second.getSkeleton():
-            skeleton = first.getSkeleton()
-            joined = second is first.getParentBodyNode() or first is second.getParentBodyNode()
-            able = able and skeleton.isEnabledSelfCollisionCheck()
-            able = able and (skeleton.isEnabledAdjacentBodyCheck() or not joined)
-        return [able]
+        """Asks the world's own filter."""
+        kept = self.made.getConstraintSolver().getCollisionOption().collisionFilter
+        pairs = product(self._objects(first), self._objects(second))
+        return [not kept.ignoresCollision(*pair) for pair in pairs]
+
+    def _objects(self, body: Any) -> list[Any]:
+        """What a filter is asked about, one of each shape. Contacts alone tell it, so the shape is
+        put into the probe."""
+        if body not in self.objects:
+            self.objects[body] = [self._object(shape) for shape in _colliding(body)]
+        return self.objects[body]
+
+    def _object(self, shape: Any) -> Any:
+        group, found = self.toucher.createCollisionGroup(), dartpy.collision.CollisionResult()
+        self.probe.setRelativeTransform(shape.getWorldTransform())
+        for frame in (shape, self.probe):
+            group.addShapeFrame(frame)
+        group.collide(dartpy.collision.CollisionOption(True, 1), found)
+        self.groups.append(group)  # to which the objects belong
+        ends = found.getContact(0).collisionObject1, found.getContact(0).collisionObject2
+        return next(end for end in ends if end.getShapeFrame().asShapeNode() is not None)
 
 
 def _colliding(body: Any) -> list[Any]:

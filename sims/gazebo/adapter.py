@@ -65,6 +65,19 @@ class Gazebo(Simulator):
                 "the adapter moves no body as prescribed: such a body stands still",
                 only="prescribed",
             ),
+            Deviation(
+                "",
+                "the adapter gives joints no damping of their own: SDF's was not tried",
+                only="passive_damping",
+            ),
+            Deviation(
+                "joint/*/friction",
+                "the adapter gives joints no dry friction: SDF's was not tried",
+                only="joint_friction",
+            ),
+            Deviation(
+                "", "the adapter gives joints no springs: SDF's were not tried", only="spring"
+            ),
             Deviation("body/*/margin", "Gazebo's boxes and round shapes have no margin outside"),
             Deviation(
                 "link/*/margin",

@@ -25,10 +25,9 @@ EXCUSED = {
     "geom solref": "body/*/restitution ground/restitution",
     "geom margin": "body/*/margin",
     "geom mesh (hull)": "body/*/meshes",
-    "geom contype, conaffinity": "body/*/touches",
-    "exclude": "body/*/touches",
+    "geom contype, conaffinity (of single shapes)": "body/*/touches",
     "pair": "body/*/friction ground/friction",
-    "body gravcomp": "body/*/gravity",
+    "body gravcomp (of parts)": "body/*/gravity",
     "joint damping (free)": "body/*/damping",
     "option density": "body/*/damping",
     "option viscosity": "body/*/damping",
@@ -79,6 +78,10 @@ class OwnFile:
                 self.placed[body.name] = replace(self.placed[body.name], frame=frame)
         free = [self.placed[body.name] for body in scene.free_bodies]
         self.roots = np.array([p.root for p in free], dtype=int)
+        for body, placed in zip(scene.free_bodies, free, strict=True):
+            if body.wrenches:  # one of them is what the file compensates of the body's gravity
+                parts = [b for b in range(self.model.nbody) if reading.root(b) == placed.root]
+                self.model.body_gravcomp[parts] = 0.0
         flying = self.model.body_jntadr[self.roots]
         self._q = self.model.jnt_qposadr[flying][:, None] + np.arange(7)
         self._v = self.model.jnt_dofadr[flying][:, None] + np.arange(3)

@@ -81,7 +81,6 @@ class Reading:
         lift: height by which the scene is moved up [m].
         placed: all bodies of the scene.
         scene: that the file makes.
-        account: of what was carried.
 
     Raises:
         DescriptionError: one sentence.
@@ -89,7 +88,7 @@ class Reading:
 
     def __init__(self, path: str, spec: Any = None) -> None:
         self.path = path
-        self.account: list[Carried] = []
+        self._told: dict[tuple[str, str, str], list[str]] = {}
         try:
             self.model = model = (spec or mujoco.MjSpec.from_file(path)).compile()
         except (ValueError, RuntimeError, OSError) as error:
@@ -109,7 +108,13 @@ class Reading:
         tell_the_rest(self)
 
     def tell(self, quantity: str, state: str, reason: str, where: Iterable[str] = ()) -> None:
-        self.account.append(Carried(quantity, state, reason, named(where)))
+        """What became of a quantity; what is told of several elements in the same words is one."""
+        self._told.setdefault((quantity, state, reason), []).extend(where)
+
+    @property
+    def account(self) -> list[Carried]:
+        """What was carried."""
+        return [Carried(*line, named(where)) for line, where in self._told.items()]
 
     def refuse(self, why: str) -> DescriptionError:
         return DescriptionError(f"{self.path}: {why}")
@@ -332,11 +337,12 @@ class Reading:
         if not shares.any():
             return body
         masses = model.body_mass[own]
-        even = np.ptp(shares[masses > 0]) < CLOSE
-        reason = f"a force of {float(shares @ masses / masses.sum()):.4g} of its weight bears it"
-        if not even:
-            reason += " at its centre of mass; in the file its parts are borne by different shares"
-        self.tell("body gravcomp", CARRIED if even else APPROXIMATED, reason, [body.name])
+        if np.ptp(shares[masses > 0]) > CLOSE:
+            reason = "its parts are borne by different shares of their weight, here by none"
+            self.tell("body gravcomp (of parts)", NOT_CARRIED, reason, [body.name])
+            return body
+        reason = f"a force of {shares.max():.4g} of its weight bears it"
+        self.tell("body gravcomp", CARRIED, reason, [body.name])
         force = vector3(-float(shares @ masses) * model.opt.gravity)
         return body.changed(wrenches=(Wrench(force=force),))
 

@@ -63,11 +63,15 @@ class ODE(Simulator):
         tested_version="1.2.0.dev15",
         friction_rule="minimum",
         capabilities=Capability.named(
-            "save_restore contact_count contact_forces compound loops self_collide "
-            "joint_wrenches deterministic"
+            "save_restore contact_count contact_forces compound loops couplings apart "
+            "self_collide joint_wrenches deterministic"
         ),
         deviations=(
-            Deviation("joint/*/friction", "ODE's joints have no friction"),
+            Deviation(
+                "coupling/*",
+                "ODE has no couplings: contacts of each step are one, of which it tells whose",
+                only="coupling",
+            ),
             Deviation("body/*/margin link/*/margin", "ODE's shapes have no margin"),
             Deviation("", "what sleeps has no contacts, and so no forces"),
             Deviation(
@@ -83,8 +87,9 @@ class ODE(Simulator):
     settings: ODESettings
 
     def load(self, scene: Scene) -> None:
-        _check_hand(scene)
         self.begin(scene)
+        if self.prepared is not None:
+            _check_couplings(self.prepared)
         s = self.settings
         library().dRandSetSeed(SEED)
         self.world = world = ode.World()
@@ -111,10 +116,12 @@ class ODE(Simulator):
         self._drives: Drives | None = None
         if self.prepared is not None:
             self._load_robot(self.prepared)
+        for pair in scene.apart:
+            self.contacts.apart.add(frozenset(id(self._part(name).surface) for name in pair))
         links = [part.body for part in self._links.values() if part.body is not None]
         self._moving = [*self._free, *links]
-        if self._drives is not None and self._drives.pinion is not None:
-            self._moving.append(self._drives.pinion.body)
+        if self._drives is not None:
+            self._moving += [pinion.body for pinion in self._drives.pinions.values()]
         self._names = [body_id(body) for body in self._moving]
 
     def _load_robot(self, prepared: PreparedRobot) -> None:
@@ -132,6 +139,11 @@ class ODE(Simulator):
             for closure in reduced(prepared)
         ]
         self._drives = Drives(self.world, robot, self._axes, s.timestep, s.drive, s.position_gain)
+
+    def _part(self, name: str) -> Part:
+        """Of "ground", `body/NAME` or `link/NAME`."""
+        kind, _, rest = name.partition("/")
+        return {"ground": {"": self._ground}, "body": self._bodies, "link": self._links}[kind][rest]
 
     def read_back(self) -> dict[str, Any]:
         return ReadBack(self).all()
@@ -226,8 +238,14 @@ class ODE(Simulator):
         return {**super().versions(), **({"libode": number} if number else {})}
 
 
-def _check_hand(scene: Scene) -> None:
-    """Refuse a hand before anything is built: what ODE frees half built crashes."""
-    fingers = 0 if scene.robot is None else len(scene.robot.gripper.joints)
-    if fingers not in (0, 1, 2):
-        raise NotSupportedError(f"ode couples two fingers at most; the robot's hand has {fingers}")
+def _check_couplings(prepared: PreparedRobot) -> None:
+    """Refuse what `Pinion` cannot couple before anything is built: what ODE frees half built
+    crashes."""
+    ends = {joint.name: {joint.parent, joint.child} for joint in prepared.joints}
+    robot = prepared.robot
+    for pair in (*robot.gripper.couplings, *robot.couplings):
+        if not ends[pair.leader] & ends[pair.follower]:
+            raise NotSupportedError(
+                f"ode couples joints of one link, and {pair.follower} and {pair.leader} have none "
+                "in common"
+            )

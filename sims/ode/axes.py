@@ -31,11 +31,13 @@ class Axis:
         turn: whole turns, and the last angle that ODE told; of a wide joint.
         stops: joint of ODE that holds it at its limits: itself, or a motor of a wide one.
         stopped: whether that motor acted in the last step.
+        motors: joints of ODE that act beside it.
     """
 
     def __init__(self, joint: Any, zero: float, wide: bool = False) -> None:
         self.joint, self.zero, self.wide = joint, zero, wide
         self.stops, self.stopped = joint, False
+        self.motors: list[Any] = []
         joint.setFeedback(True)
         self.child, self.parent = joint.getBody(0), joint.getBody(1)
         self.hinged = isinstance(joint, ode.HingeJoint)
@@ -60,6 +62,29 @@ class Axis:
         self.stops.setParam(LO_STOP, lower)
         self.stops.setParam(HI_STOP, upper)
 
+    def motor(self, world: Any) -> Any:
+        """A motor beside the joint's own.
+
+        Of a slider it is that of a second slider: ODE's motors along an axis pull at centres of
+        mass, and so turn two bodies whose centres are not upon it.
+        """
+        made = ode.AMotor(world) if self.hinged else ode.SliderJoint(world)
+        made.attach(self.child, self.parent)
+        if self.hinged:
+            made.setNumAxes(1)
+            made.setAxis(0, 1, self.joint.getAxis())  # 1: turns with the child
+        else:
+            made.setAxis(self.joint.getAxis())
+        made.setFeedback(True)
+        self.motors.append(made)
+        return made
+
+    def inertia(self) -> float:
+        """Of the child alone: about its centre along the axis [kg m^2], or its mass [kg]."""
+        mass = self.child.getMass()
+        axis = np.array(self.child.vectorFromWorld(self.joint.getAxis()))
+        return float(axis @ np.array(mass.I) @ axis) if self.hinged else float(mass.mass)
+
     def tell_stops(self) -> None:
         """Before a step: where a wide joint stands."""
         angle = self.angle()
@@ -68,13 +93,16 @@ class Axis:
         self.stopped = not low < angle < high
 
     def wrench(self, frame: Pose, timestep: float) -> FloatArray:
-        """What it did to its child in the last step, motor included, in the world, (6,).
+        """What it did to its child in the last step, motors included, in the world, (6,).
 
         Args:
             frame: of the link in the child's, about whose origin the torque is.
             timestep: of the last step, at whose begin the child stood where it acted [s].
         """
         force, torque = map(np.array, self.joint.getFeedback()[:2])  # about the child's centre
+        for motor in self.motors:
+            pull, turn = motor.getFeedback()[:2]
+            force, torque = force + pull, torque + turn
         if self.stopped:  # ODE writes no feedback of what did nothing
             torque = torque + self.stops.getFeedback()[1]
         offset = np.array(self.child.vectorToWorld(frame.position))

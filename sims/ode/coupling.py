@@ -1,37 +1,45 @@
-"""What couples the fingers: a pinion between racks.
+"""What couples two joints: a pinion between racks.
 
 pyode wraps no gears. But the friction row of a contact, without a limit, is what holds two teeth
 together: it keeps the velocities of two bodies equal at a point, along one direction. So a small
-body, hinged to the hand, touches each finger at a point of its rim: two fingers that face each
-other at opposite points. It carries the fingers' rotors. The points are thought: nothing is there
-to collide.
+body, hinged to the link that both joints have in common, touches what moves on it by either joint:
+two fingers that face each other at opposite points of its rim. The points are thought: nothing is
+there to collide.
+
+Where a joint moves by k times the pinion's angle, a point and a direction u are right if the
+pinion's velocity there, along u, is k times the joint's. Of a slider that is the point of the rim
+at radius k, and u its axis; of a hinge see `_hinged`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray
-from pytest_simbench.simulator import NotSupportedError, lazy_import
+from pytest_simbench.scene import Coupling, FloatArray
+from pytest_simbench.simulator import lazy_import
 
 from .axes import Axis
 
 ode = lazy_import("ode")
 
 RADIUS = 0.01
-"""Of the pinion [m]. It turns with the rotors' inertia times RADIUS^2: 2e-5 kg m^2."""
+"""Of the pinion for a leader that slides [m]. It turns with the rotors' inertia times RADIUS^2:
+2e-5 kg m^2. With a leader that turns it turns alike."""
+
+LEVER = 0.1
+"""From the axis of a hinge to where the pinion holds it [m]."""
 
 MASS = 1e-3
 """Of the pinion [kg], without weight."""
 
 LIGHTEST = 1e-6
-"""The rotors' least inertia [kg], where the scene has none: the pinion needs some."""
+"""The rotors' least inertia [kg or kg m^2], where the scene has none: the pinion needs some."""
 
 CORRECTED = 0.2
-"""Share of the difference between the fingers that is corrected in a step."""
+"""Share of the joints' error that is corrected in a step."""
 
 PARALLEL = 1e-6
 """Sine of the angle below which two directions are one."""
@@ -42,96 +50,137 @@ the process (an assertion of its LCP solver: a pivot of 0)."""
 
 
 class Pinion:
-    """Sliding fingers that move alike.
+    """Two joints that move together.
 
     Args:
         world: of ODE.
-        fingers: their joints; they slide in the same hand, in one plane.
-        inertia: of the fingers' rotors, together [kg].
+        pair: which, and how.
+        axes: the joints by name; both have a link in common, or the world.
+        inertia: of the rotors of both, as the leader has it [kg or kg m^2].
         timestep: [s].
 
     Attributes:
-        fingers: their joints.
+        joints: leader and follower.
         body: of ODE.
-
-    Raises:
-        NotSupportedError: fingers that turn, are not of one hand, or slide in no plane.
     """
 
     def __init__(
-        self, world: Any, fingers: Sequence[Axis], inertia: float, timestep: float
+        self, world: Any, pair: Coupling, axes: Mapping[str, Axis], inertia: float, timestep: float
     ) -> None:
-        hand = fingers[0].parent
-        if hand is None or any(axis.hinged or axis.parent is not hand for axis in fingers):
-            raise NotSupportedError("ode couples fingers that slide in one hand, no others")
-        self._world, self.fingers, self._hand = world, tuple(fingers), hand
-        self._correction = CORRECTED / timestep / len(fingers)
-        centre = np.mean([axis.child.getPosition() for axis in fingers], axis=0)
-        directions = [np.array(axis.joint.getAxis()) for axis in fingers]
-        shaft = _across(directions)
-        self._arms = [
-            self._hand.vectorFromWorld(tuple(np.cross(direction, shaft)))
-            for direction in directions
+        self._world, self._pair = world, pair
+        self.joints = leader, follower = axes[pair.leader], axes[pair.follower]
+        ends = [follower.parent, follower.child]
+        shared = any(leader.parent is end for end in ends)
+        self._link = link = leader.parent if shared else leader.child
+        signs = [1.0 if axis.parent is link else -1.0 for axis in self.joints]
+        directions = [
+            sign * np.array(axis.joint.getAxis())
+            for axis, sign in zip(self.joints, signs, strict=True)
         ]
+        centre = np.mean([axis.child.getPosition() for axis in self.joints], axis=0)
+        shaft = _across(*directions)
+        self._leads = 1.0 if leader.hinged else RADIUS
         self.body = ode.Body(world)
-        weight, moment = ode.Mass(), max(inertia, LIGHTEST) * RADIUS**2
+        weight, moment = ode.Mass(), max(inertia, LIGHTEST) * self._leads**2
         weight.setParameters(MASS, 0, 0, 0, moment, moment, moment, 0, 0, 0)
         self.body.setMass(weight)
         self.body.setGravityMode(False)
         self.body.setPosition(tuple(centre))
         self._hinge = ode.HingeJoint(world)
-        self._hinge.attach(self.body, self._hand)
+        self._hinge.attach(self.body, link)
         self._hinge.setAnchor(tuple(centre))
         self._hinge.setAxis(tuple(shaft))
-        self._contact = _teeth()
+        share = CORRECTED / timestep / (1 + pair.ratio**2)
+        self._teeth = []
+        for axis, direction, ratio, corrected in zip(
+            self.joints, directions, (1.0, pair.ratio), (pair.ratio * share, -share), strict=True
+        ):
+            k = ratio * self._leads
+            found = _hinged(axis, direction, centre, shaft, k) if axis.hinged else None
+            point, normal, along, speed = found or _sliding(direction, centre, shaft, k)
+            wheel = axis.child if axis.parent is link else axis.parent
+            bodies, sign = ((wheel, self.body), 1.0) if wheel else ((self.body, None), -1.0)
+            place = link.getPosRelPoint(tuple(point)) if link else tuple(point)
+            turn = link.vectorFromWorld if link else tuple
+            tooth = (bodies, place, turn(tuple(normal)), turn(tuple(along)))
+            self._teeth.append((*tooth, sign * speed * corrected))
+        self._contact = _tooth()
         self._group = ode.JointGroup()
         self._racks: list[Any] = []
 
     @property
     def inertia(self) -> float:
-        """Of the rotors, together [kg]."""
-        return float(self.body.getMass().I[0][0]) / RADIUS**2
+        """Of the rotors, together, as the leader has it [kg or kg m^2]."""
+        return float(self.body.getMass().I[0][0]) / self._leads**2
 
     @property
     def holds(self) -> bool:
-        """Whether each finger is held to the pinion."""
-        return [rack.getBody(0) for rack in self._racks] == [axis.child for axis in self.fingers]
+        """Whether both joints are held to the pinion."""
+        held = [(rack.getBody(0), rack.getBody(1)) for rack in self._racks]
+        return held == [bodies for bodies, *_ in self._teeth]
 
     def mesh(self) -> None:
-        """Before a step: hold the fingers to the pinion where it is now."""
+        """Before a step: hold the joints to the pinion where it is now."""
         self.release()
-        positions = [axis.position() for axis in self.fingers]
-        x, y, z = self.body.getPosition()
-        for axis, arm, position in zip(self.fingers, self._arms, positions, strict=True):
-            apart = sum(position - other for other in positions)
-            u, v, w = normal = self._hand.vectorToWorld(arm)
-            at = (x + RADIUS * u, y + RADIUS * v, z + RADIUS * w)
-            self._contact.setContactGeomParams(at, normal, 0.0)
-            self._contact.setFDir1(axis.joint.getAxis())
-            self._contact.setMotion1(-self._correction * apart)
-            rack = ode.ContactJoint(self._world, self._group, self._contact)
-            rack.attach(axis.child, self.body)
+        leader, follower = self.joints
+        pair, link, contact = self._pair, self._link, self._contact
+        error = follower.position() - pair.ratio * leader.position() - pair.offset
+        for bodies, place, normal, along, corrected in self._teeth:
+            if link is not None:
+                place, normal = link.getRelPointPos(place), link.vectorToWorld(normal)
+                along = link.vectorToWorld(along)
+            contact.setContactGeomParams(place, normal, 0.0)
+            contact.setFDir1(along)
+            contact.setMotion1(corrected * error)
+            rack = ode.ContactJoint(self._world, self._group, contact)
+            rack.attach(*bodies)
             self._racks.append(rack)
 
     def release(self) -> None:
-        """Let the fingers go."""
+        """Let the joints go."""
         self._group.empty()
         self._racks.clear()
 
 
-def _across(directions: Sequence[FloatArray]) -> FloatArray:
-    """A unit vector at right angles to all."""
-    first = directions[0]
-    others = [other for other in directions if np.linalg.norm(np.cross(first, other)) > PARALLEL]
-    second = others[0] if others else np.eye(3)[np.argmin(np.abs(first))]
+Tooth = tuple[FloatArray, FloatArray, FloatArray, float]
+"""Point, normal and direction in the world, and the joint's velocity there, along the direction, at
+unit joint speed. Nothing moves along the normal against each other."""
+
+
+def _sliding(direction: FloatArray, centre: FloatArray, shaft: FloatArray, k: float) -> Tooth:
+    """Of a slider along `direction`."""
+    normal = np.cross(direction, shaft)
+    return centre + k * normal, normal, direction, 1.0
+
+
+def _hinged(
+    axis: Axis, direction: FloatArray, centre: FloatArray, shaft: FloatArray, k: float
+) -> Tooth:
+    """Of a hinge about `direction`: beside its axis it moves along the shaft, across which the
+    pinion moves. The direction lies between both."""
+    beside, anchor = np.cross(direction, shaft), np.array(axis.joint.getAnchor())
+    rims = {y: np.cross(shaft, anchor + y * beside - centre) for y in (LEVER, -LEVER)}
+    y, rim = max(rims.items(), key=lambda item: float(np.linalg.norm(item[1])))
+    along = k * y / (rim @ rim) * rim - shaft
+    length = float(np.linalg.norm(along))
+    normal = np.cross(along, rim + k * y * shaft)
+    return (
+        anchor + y * beside,
+        normal / np.linalg.norm(normal),
+        along / length,
+        y / length,
+    )
+
+
+def _across(first: FloatArray, second: FloatArray) -> FloatArray:
+    """A unit vector at right angles to both."""
+    if np.linalg.norm(np.cross(first, second)) < PARALLEL:
+        second = np.eye(3)[np.argmin(np.abs(first))]
     found = np.cross(first, second)
-    found /= np.linalg.norm(found)
-    if any(abs(found @ direction) > PARALLEL for direction in directions):
-        raise NotSupportedError("ode couples fingers that slide in one plane, no others")
-    return np.asarray(found)
+    return np.asarray(found / np.linalg.norm(found))
 
 
-def _teeth() -> Any:
+def _tooth() -> Any:
     """Contact parameters of a row without limit along one direction, and nothing across it."""
     contact = ode.Contact()
     contact.setMode(ode.ContactFDir1 | ode.ContactMu2 | ode.ContactMotion1 | ode.ContactSoftCFM)

@@ -9,9 +9,13 @@ bounded by FMax. What it does follows from Vel and CFM:
 - `velocity`: Vel = P (q* - q), what Webots does with its motors; CFM is the world's.
 - at a stop ODE does not put the motor into the solver: it pushes with all of FMax, whatever Vel is.
   A drawer of 1.4 kg that begins at its stop left with 15 m/s, of a motor that brakes with at most
-  10 kN. So at a stop FMax is, for that step, what the law asks for, of joints that are no fingers.
+  10 kN. So at a stop FMax is, for that step, what the law asks for, of joints that are neither
+  fingers nor coupled.
 - a rotor of inertia J: with Vel the present velocity and CFM = h / J the effort is that which
   accelerates it, -J dv / h, and FMax has no limit. It is a motor of its own beside the drive's.
+- so are a joint's own spring and damping, by the drive law without a limit, and its dry friction:
+  Vel = 0 and FMax the friction. With the velocity after the whole step a spring k loses energy as
+  if h k damped it; one that is soft enough takes the velocity after `EXPLICIT` of the step.
 """
 
 from __future__ import annotations
@@ -21,7 +25,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Robot
+from pytest_simbench.scene import FloatArray, Joint, Robot
 from pytest_simbench.simulator import lazy_import
 
 from .axes import Axis
@@ -34,6 +38,11 @@ Drive = Literal["spring", "velocity"]
 
 WEAKEST = 1e-9
 """Least resistance h k + d of a drive [N m s/rad or N s/m]: a joint without k and d has no CFM."""
+
+
+EXPLICIT = 0.01
+"""Share of the step after which a spring is told where it stands, where h^2 k is below the child's
+own inertia: stable without any, up to four times that."""
 
 
 class Rotor:
@@ -67,6 +76,44 @@ class Rotor:
         return float(x * (u - a) + y * (v - b) + z * (w - c))
 
 
+class Passive:
+    """What a joint does by itself: its spring, damping and dry friction.
+
+    Args:
+        world: of ODE.
+        axis: the joint.
+        joint: its quantities.
+        timestep: [s].
+
+    Attributes:
+        gain: velocity that the spring asks for at unit distance from its rest [1/s].
+        ahead: time after which the spring is told where it stands [s].
+        damper: motor that is spring and damping; None for neither.
+        brake: motor that is the friction; None for none.
+    """
+
+    def __init__(self, world: Any, axis: Axis, joint: Joint, timestep: float) -> None:
+        self.axis, self.rest = axis, joint.rest
+        self.damper: Any = None
+        self.brake: Any = None
+        soft = timestep**2 * joint.spring < axis.inertia()
+        self.ahead = (EXPLICIT if soft else 1.0) * timestep
+        resistance = self.ahead * joint.spring + joint.passive_damping
+        self.gain = joint.spring / resistance if resistance else 0.0
+        if resistance:
+            self.damper = axis.motor(world)
+            self.damper.setParam(MOST_FORCE, ode.Infinity)
+            self.damper.setParam(SOFTNESS, 1 / resistance)
+        if joint.friction:
+            self.brake = axis.motor(world)
+            self.brake.setParam(MOST_FORCE, joint.friction)
+
+    def pull(self) -> None:
+        """Before a step: tell the spring where the joint stands."""
+        if self.gain:
+            self.damper.setParam(VELOCITY, self.gain * (self.rest - self.axis.position()))
+
+
 class Drives:
     """The drives of a robot.
 
@@ -79,12 +126,10 @@ class Drives:
         position_gain: P of the kind `velocity` [1/s].
 
     Attributes:
-        rotors: of the arm's joints, by name.
-        pinion: couples the fingers, and has their rotors; None for fewer than two.
+        rotors: by name of the joint, but those of two coupled fingers.
+        passive: what joints do by themselves, by name of those that do something.
+        pinions: couple joints, by follower; that of two fingers has their rotors.
         commanded: the last set points: position, velocity, effort.
-
-    Raises:
-        NotSupportedError: fingers that cannot be coupled.
     """
 
     def __init__(
@@ -107,18 +152,26 @@ class Drives:
             if soft is not None:
                 axis.joint.setParam(SOFTNESS, soft)
         inertias = dict(zip(robot.joint_names, robot.column("armature"), strict=True))
-        self.pinion: Pinion | None = None
-        if len(robot.gripper.joints) > 1:
-            rotors = sum(inertias.pop(name) for name in robot.gripper.joints)
-            self.pinion = Pinion(world, fingers, rotors, timestep)
+        self.pinions: dict[str, Pinion] = {}
+        for pair in (*robot.gripper.couplings, *robot.couplings):
+            rotors = 0.0
+            if pair in robot.gripper.couplings and len(fingers) == 2:
+                rotors = sum(inertias.pop(name) for name in robot.gripper.joints)
+            self.pinions[pair.follower] = Pinion(world, pair, axes, rotors, timestep)
         self.rotors = {
             name: Rotor(world, axes[name], inertia, timestep)
             for name, inertia in inertias.items()
             if inertia > 0
         }
+        self.passive = {
+            joint.name: Passive(world, axes[joint.name], joint, timestep)
+            for joint in robot.joints
+            if joint.passive_damping or joint.spring or joint.friction
+        }
+        coupled = {*fingers, *(a for pinion in self.pinions.values() for a in pinion.joints)}
         self._motors = []
         for axis, gain, soft in zip(self.axes, self._shares[0], softness, strict=True):
-            eased = soft is not None and axis not in fingers and not axis.wide
+            eased = soft is not None and axis not in coupled and not axis.wide
             stops = [axis.joint.getParam(end) for end in (LO_STOP, HI_STOP)]
             stops = stops if eased else [-np.inf, np.inf]
             self._motors.append((axis, axis.joint.setParam, axis.angle, float(gain), *stops))
@@ -127,8 +180,8 @@ class Drives:
         self._eased: list[Axis] = []
         start = robot.column("initial_position")
         self.command(start, 0 * start, 0 * start)
-        if self.pinion is not None:
-            self.pinion.mesh()
+        for pinion in self.pinions.values():
+            pinion.mesh()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         """Set points of all joints."""
@@ -153,8 +206,10 @@ class Drives:
                 self._eased.append(axis)
         for rotor in self.rotors.values():
             rotor.turn()
-        if self.pinion is not None:
-            self.pinion.mesh()
+        for passive in self.passive.values():
+            passive.pull()
+        for pinion in self.pinions.values():
+            pinion.mesh()
 
     def rest(self) -> None:
         """After a step: all have their largest effort again."""

@@ -58,7 +58,7 @@ class ReadBack(readback.ReadBack):
         return [self._points(joint) for joint in self.loops]
 
     def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
-        return bool(self.drives.pinion.holds if self.drives.pinion else not pairs)
+        return all(self.drives.pinions[pair.follower].holds for pair in pairs)
 
     def pose(self, part: Part) -> FloatArray:
         return self._frame(part).as_array()
@@ -145,12 +145,23 @@ class ReadBack(readback.ReadBack):
             "stiffness": stiffness,
             "damping": resistance - self.timestep * stiffness,
             "armature": 0.0,
+            "friction": 0.0,
         }
+        if name in drives.passive:
+            passive = drives.passive[name]
+            if passive.damper is not None:
+                resistance = 1 / passive.damper.getParam(SOFTNESS)
+                found["stiffness"] += resistance * passive.gain
+                found["damping"] += resistance * (1 - passive.ahead * passive.gain)
+            if passive.brake is not None:
+                found["friction"] = passive.brake.getParam(MOST_FORCE)
         if name in drives.rotors:
             softness = drives.rotors[name].motor.getParam(SOFTNESS)
             found["armature"] = self.timestep / softness
-        elif drives.pinion is not None and axis in drives.pinion.fingers:
-            found["armature"] = drives.pinion.inertia / len(drives.pinion.fingers)
+        for pair in self.prepared.robot.gripper.couplings:
+            pinion = drives.pinions[pair.follower]
+            if name not in drives.rotors and axis in pinion.joints:
+                found["armature"] = pinion.inertia / 2
         return found
 
     def _child(self, axis: Axis) -> Part:

@@ -2,7 +2,8 @@
 
 The world is handed over as a USD stage, see `stage`. Drives are PhysX's own: implicit
 springs and dampers in reduced coordinates. Their largest force bounds the drive alone, so effort
-feed-forward rides on the position target, q* + tau_ff / k, and the limit bounds the whole sum.
+feed-forward rides on the position target, q* + tau_ff / k, and the limit bounds the whole sum. So
+does a spring s of the joint itself: k is then k + s, and s (rest - q*) is added to tau_ff.
 
 While stepping the engine is commanded and read through its tensor bindings: 0.01 ms each, where a
 session (`session`) takes 0.4 ms. They are deprecated; the version is pinned. The first
@@ -61,7 +62,8 @@ class OvPhysX(Simulator):
         oldest_version="0.7.0.74035321",  # older ones tell no joint before the first step
         friction_rule="mean",
         capabilities=Capability.named(
-            "deterministic save_restore contact_forces compound loops self_collide joint_wrenches"
+            "deterministic save_restore contact_forces compound loops couplings apart "
+            "self_collide joint_wrenches"
         ),
         deviations=(
             Deviation(
@@ -72,10 +74,17 @@ class OvPhysX(Simulator):
             Deviation(
                 "ground/friction ground/restitution", "PhysX reports no material of a static plane"
             ),
-            Deviation("gripper/coupled", "PhysX reports no mimic joints"),
+            Deviation("gripper/coupled coupling/*", "PhysX reports no mimic joints"),
             Deviation(
                 "",
                 "contact forces are told in scenes without a robot alone: reports are slow",
+            ),
+            Deviation(
+                "joint/*/effort_limit",
+                "PhysX has one spring a joint, that of its drive with the joint's own: the drive's "
+                "limit bounds both, of a drive that is free none",
+                within=usd.BOUNDLESS,
+                only="spring",
             ),
             Deviation("body/*/damping link/*/damping", "PhysX reports no damping of bodies"),
             Deviation("body/*/dynamic", "PhysX does not report which bodies are kinematic"),
@@ -139,7 +148,9 @@ class OvPhysX(Simulator):
         if self.prepared is not None:
             robot = self.prepared.robot
             self._joints = [usd.joint_path(i) for i in range(len(robot.joints))]
-            self._stiffness = robot.column("stiffness")
+            self._springs = robot.column("spring") if "spring" in scene.words else None
+            self._rests = robot.column("rest")
+            self._stiffness = robot.column("stiffness") + robot.column("spring")
             self._placed = link_poses(self.prepared, dict.fromkeys(robot.joint_names, 0.0))
             kinds = {joint.name: joint.kind for joint in self.prepared.joints}
             turning = [kinds[name] == "revolute" for name in robot.joint_names]
@@ -177,6 +188,8 @@ class OvPhysX(Simulator):
         binding.write(buffer)
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        if self._springs is not None:
+            effort = effort + self._springs * (self._rests - position)
         self._targets = position + effort / self._stiffness, velocity
         if self._steps > 0:
             self._write_targets(self._targets)

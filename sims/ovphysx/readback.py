@@ -154,7 +154,9 @@ class ReadBack(readback.ReadBack):
             quantity: values[attribute][path][0] * unit**power
             for attribute, (quantity, power) in _JOINT.items()
         }
-        found["friction"] = sum(abs(values[kind][path][0]) for kind in _PASSIVE)
+        static, dynamic, viscous = (float(values[kind][path][0]) for kind in _PASSIVE)
+        found["friction"] = one_value([static, dynamic])
+        found["damping"] += viscous / unit
         return found | {"axis": self.axes[name]}
 
     def touches(self) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from pytest_simbench.scene import (
     Capsule,
     Closure,
     ConvexMesh,
+    Coupling,
     Cylinder,
     FloatArray,
     Joint,
@@ -30,6 +31,7 @@ from pytest_simbench.scene import (
     Scene,
     Sphere,
 )
+from pytest_simbench.scene.robot import FREE
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 
 from . import usd_text as usd
@@ -39,6 +41,9 @@ GROUND, ROOT = "/World/ground", "/World/root_joint"
 _COLLIDER = ("PhysicsCollisionAPI", "PhysxCollisionAPI", "MaterialBindingAPI")
 _HULL = (*_COLLIDER, "PhysicsMeshCollisionAPI")
 _BODY = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI")
+BOUNDLESS = 1e9
+"""Largest effort of a joint's spring whose drive leaves it free [N m or N]."""
+
 _REPORT = "float physxContactReport:threshold = 0"
 
 
@@ -86,6 +91,13 @@ class Stage:
     ) -> None:
         self.scene = scene
         self.prepared = prepared
+        links = () if prepared is None else prepared.links
+        self._paths = {
+            "ground": GROUND,
+            **{f"body/{body.name}": body_path(i) for i, body in enumerate(scene.bodies)},
+            **{f"link/{name}": link_path(i) for i, name in enumerate(links)},
+        }
+        self._apart = [(self._paths[first], self._paths[second]) for first, second in scene.apart]
         self._lines = {
             prefix: usd.attributes(prefix, values) for prefix, values in attributes.items()
         }
@@ -93,7 +105,7 @@ class Stage:
     def text(self) -> str:
         """The stage as `.usda` text."""
         prims = [self._physics(), *self._materials(), self._ground()]
-        prims += [self._body(i, box) for i, box in enumerate(self.scene.bodies)]
+        prims += [self._body(box) for box in self.scene.bodies]
         if self.prepared is not None:
             prims += self._robot(self.prepared)
         units = "metersPerUnit = 1\n kilogramsPerUnit = 1"
@@ -143,9 +155,25 @@ class Stage:
             'uniform token axis = "Z"',
             *self._surface(self.scene.ground_friction, self.scene.ground_restitution),
         ]
-        return usd.prim("Plane", "ground", _COLLIDER, lines)
+        return self._collider("ground", "Plane", _COLLIDER, lines)
 
-    def _body(self, index: int, box: Body) -> str:
+    def _collider(
+        self,
+        name: str,
+        kind: str,
+        schemas: Sequence[str],
+        lines: Sequence[str],
+        children: Sequence[str] = (),
+    ) -> str:
+        """The prim of "ground", `body/NAME` or `link/NAME`, and what it is kept apart from."""
+        path = self._paths[name]
+        others = [f"<{second}>" for first, second in self._apart if first == path]
+        if others:
+            schemas = (*schemas, "PhysicsFilteredPairsAPI")
+            lines = [*lines, f"rel physics:filteredPairs = [{', '.join(others)}]"]
+        return usd.prim(kind, path.rpartition("/")[2], schemas, lines, children)
+
+    def _body(self, box: Body) -> str:
         """A rigid body; kinematic where it has no mass: PhysX reports nothing of static ones."""
         surface, shapes = self._surface(box.friction, box.restitution), []
         for k, part in enumerate(box.parts):
@@ -163,7 +191,7 @@ class Stage:
             spin = np.degrees(box.angular_velocity)
             lines.append(f"vector3f physics:velocity = {usd.numbers(box.linear_velocity)}")
             lines.append(f"vector3f physics:angularVelocity = {usd.numbers(spin)}")
-        return usd.prim("Xform", f"body_{index}", schemas, lines, shapes)
+        return self._collider(f"body/{box.name}", "Xform", schemas, lines, shapes)
 
     def _rigid(self, body: Body) -> list[str]:
         """The engine's settings of a body, and its own damping where it has one."""
@@ -179,10 +207,7 @@ class Stage:
         poses = {prepared.root: Pose()}
         for joint in prepared.joints:
             poses[joint.child] = poses[joint.parent] * joint.origin
-        prims = [
-            self._link(i, prepared.links[name], poses[name], robot.friction)
-            for i, name in enumerate(names)
-        ]
+        prims = [self._link(prepared.links[name], poses[name], robot.friction) for name in names]
         root = [
             f"rel physics:body1 = <{link_path(names.index(prepared.root))}>",
             f"bool physxArticulation:enabledSelfCollisions = {str(robot.self_collide).lower()}",
@@ -190,22 +215,25 @@ class Stage:
         ]
         schemas = ("PhysicsArticulationRootAPI", "PhysxArticulationAPI")
         prims.append(usd.prim("PhysicsFixedJoint", ROOT.rpartition("/")[2], schemas, root))
-        first, *others = [*robot.finger_indices, None]
+        kinds = {joint.name: joint.kind for joint in prepared.joints}
+        mimics = {
+            pair.follower: _mimic(pair, robot.joint_names.index(pair.leader), kinds)
+            for pair in (*robot.gripper.couplings, *robot.couplings)
+        }
         for joint in prepared.joints:
             index = robot.joint_names.index(joint.name)
-            limits = prepared.limits[joint.name]
-            coupled_to = first if index in others else None
-            prims.append(_joint(index, joint, robot.joints[index], limits, names, coupled_to))
+            limits, mimic = prepared.limits[joint.name], mimics.get(joint.name, [])
+            prims.append(_joint(index, joint, robot.joints[index], limits, names, mimic))
         for k, closure in enumerate(reduced(prepared)):
             prims.append(_closure(k, closure, names))
         return prims
 
-    def _link(self, index: int, link: Link, pose: Pose, friction: float) -> str:
+    def _link(self, link: Link, pose: Pose, friction: float) -> str:
         lines = [*usd.placed(pose), *self._lines["physxRigidBody"]]
         if link.mass > 0:
             lines += usd.mass_lines(link.mass, link.centre, link.inertia)
         shapes = [self._shape(i, shape, friction) for i, shape in enumerate(link.shapes)]
-        return usd.prim("Xform", f"link_{index}", _BODY, lines, shapes)
+        return self._collider(f"link/{link.name}", "Xform", _BODY, lines, shapes)
 
     def _shape(self, index: int, shape: Shape, friction: float) -> str:
         """A box, or the convex hull of a mesh, which PhysX makes (at most 64 corners)."""
@@ -254,18 +282,35 @@ def _closure(number: int, closure: Closure, links: Sequence[str]) -> str:
     return usd.prim("PhysicsSphericalJoint", f"closure_{number}", (), lines)
 
 
+def _mimic(pair: Coupling, leader: int, kinds: Mapping[str, str]) -> list[str]:
+    """Lines that couple a joint: q + gearing q_reference + offset = 0."""
+    follower, led = (
+        math.pi / 180 if kinds[name] == "revolute" else 1.0 for name in (pair.follower, pair.leader)
+    )
+    return [
+        f"float physxMimicJoint:rotX:gearing = {-pair.ratio * led / follower!r}",
+        f"float physxMimicJoint:rotX:offset = {-pair.offset / follower!r}",
+        f"rel physxMimicJoint:rotX:referenceJoint = <{joint_path(leader)}>",
+    ]
+
+
 def _joint(
     index: int,
     joint: MovingJoint,
     drive: Joint,
     limits: FloatArray,
     links: Sequence[str],
-    coupled_to: int | None,
+    mimic: Sequence[str],
 ) -> str:
-    """A joint about or along the x axis of its frames, with drive, rotor and coupling."""
+    """A joint about or along the x axis of its frames, with drive, rotor and coupling; `mimic` is
+    empty without one. Drive and spring of the joint are one spring."""
     revolute = joint.kind == "revolute"
     axis, unit = ("angular", math.pi / 180) if revolute else ("linear", 1.0)
     start = drive.initial_position / unit
+    stiffness, passive = drive.stiffness + drive.spring, drive.passive_damping * unit
+    pull = drive.spring * (drive.rest - drive.initial_position)
+    target = start + (pull / stiffness / unit if pull else 0.0)
+    limit = BOUNDLESS if drive.spring and drive.effort_limit <= FREE else drive.effort_limit
     turned = Pose(quaternion=usd.turn_from_x(np.asarray(joint.axis)))
     before = joint.origin * turned
     lower, upper = (float(limit) / unit for limit in limits)
@@ -279,21 +324,20 @@ def _joint(
         f"float physics:lowerLimit = {lower!r}",
         f"float physics:upperLimit = {upper!r}",
         f'uniform token drive:{axis}:physics:type = "force"',
-        f"float drive:{axis}:physics:stiffness = {drive.stiffness * unit!r}",
+        f"float drive:{axis}:physics:stiffness = {stiffness * unit!r}",
         f"float drive:{axis}:physics:damping = {drive.damping * unit!r}",
-        f"float drive:{axis}:physics:maxForce = {drive.effort_limit!r}",
-        f"float drive:{axis}:physics:targetPosition = {start!r}",
+        f"float drive:{axis}:physics:maxForce = {limit!r}",
+        f"float drive:{axis}:physics:targetPosition = {target!r}",
         f"float physxJointAxis:{axis}:armature = {drive.armature!r}",
+        f"float physxJointAxis:{axis}:staticFrictionEffort = {drive.friction!r}",
+        f"float physxJointAxis:{axis}:dynamicFrictionEffort = {drive.friction!r}",
+        f"float physxJointAxis:{axis}:viscousFrictionCoefficient = {passive!r}",
         f"float state:{axis}:physics:position = {start!r}",
     ]
     apis = ("PhysicsDriveAPI", "PhysxJointAxisAPI", "PhysicsJointStateAPI")
     schemas = [f"{api}:{axis}" for api in apis]
-    if coupled_to is not None:
-        # q + gearing q_reference + offset = 0; the instance's name is idle at a linear joint.
+    if mimic:
         schemas.append("PhysxMimicJointAPI:rotX")
-        lines += [
-            "float physxMimicJoint:rotX:gearing = -1",
-            f"rel physxMimicJoint:rotX:referenceJoint = <{joint_path(coupled_to)}>",
-        ]
+        lines += mimic
     kind = "PhysicsRevoluteJoint" if revolute else "PhysicsPrismaticJoint"
     return usd.prim(kind, f"joint_{index}", schemas, lines)

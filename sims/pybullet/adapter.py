@@ -3,7 +3,7 @@
 Drives are Bullet's own position motors: velocity constraints that ask, each step, for the velocity
 `velocityGain` (v* - v) + v* + `positionGain` (q* - q) / timestep, with the effort limit as largest
 force. They are not springs: there is no stiffness in N m/rad, and no effort feed-forward, which
-they do not need. The fingers' effort limit is the grip's squeeze.
+they do not need. The fingers' effort limit is the grip's squeeze. What joints do beside: joints.py.
 
 What was learnt stands in docs/engines/pybullet.md.
 """
@@ -23,6 +23,7 @@ from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
+    NotSupportedError,
     PreparedRobot,
     Simulator,
     SimulatorInfo,
@@ -32,6 +33,7 @@ from pytest_simbench.simulator import (
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from .anchors import Anchors
+from .joints import Passive, couple, rub
 from .readback import ReadBack, wrench
 from .settings import CHOSEN_ON, PROFILES, PyBulletSettings
 from .world import ROBOT, WORLD, add_body, close_loop, set_surface
@@ -57,7 +59,7 @@ class PyBullet(Simulator):
         friction_rule="geometric",
         capabilities=Capability.named(
             "window offscreen save_restore exact_restore contact_count contact_forces compound "
-            "loops self_collide joint_wrenches deterministic"
+            "loops couplings apart self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation("joint/*/armature", "Bullet has no rotor inertia"),
@@ -133,12 +135,23 @@ class PyBullet(Simulator):
         self._part_from_still(scene)
         self._robot = -1
         self._anchors: Anchors | None = None
+        self._passive: Passive | None = None
         self._couplings: list[int] = []
         self._closures: list[int] = []
         self._joints: list[int] = []
         self._links: dict[str, int] = {}
         if self.prepared is not None:
             self._load_robot(self.prepared)
+        for pair in scene.apart:
+            (first, a), (second, b) = map(self._part, pair)
+            pybullet.setCollisionFilterPair(first, second, a, b, 0, c)
+
+    def _part(self, name: str) -> tuple[int, int]:
+        """Bullet's numbers of the body and link of "ground", `body/NAME` or `link/NAME`."""
+        kind, _, rest = name.partition("/")
+        if kind == "link":
+            return self._robot, self._links[rest]
+        return (self._bodies[rest] if rest else self._ground), -1
 
     def _part_from_still(self, scene: Scene) -> None:
         """Prescribed bodies do not touch what nothing can move."""
@@ -187,9 +200,17 @@ class PyBullet(Simulator):
         for joint in self._joints:
             pybullet.enableJointForceTorqueSensor(self._robot, joint, True, physicsClientId=c)
         self._couplings = [
-            self._couple(index[pair.leader], index[pair.follower])
-            for pair in robot.gripper.couplings
+            couple(c, self._robot, index[pair.leader], index[pair.follower], pair)
+            for pair in (*robot.gripper.couplings, *robot.couplings)
         ]
+        self._couplings += [
+            rub(c, self._robot, index[joint.name], joint.friction)
+            for joint in robot.joints
+            if joint.friction
+        ]
+        if any(joint.spring or joint.passive_damping for joint in robot.joints):
+            step = self.settings.timestep
+            self._passive = Passive(c, self._robot, self._joints, robot, step)
         self._closures = [
             close_loop(c, self._robot, self._links, closure) for closure in reduced(prepared)
         ]
@@ -197,24 +218,6 @@ class PyBullet(Simulator):
         self._forces = list(robot.column("effort_limit"))
         self._gains = ([self.settings.position_gain] * n, [self.settings.velocity_gain] * n)
         self.command(robot.column("initial_position"), np.zeros(n), np.zeros(n))
-
-    def _couple(self, first: int, second: int) -> int:
-        """Hold two fingers at equal positions; the constraint."""
-        made: int = pybullet.createConstraint(
-            self._robot,
-            first,
-            self._robot,
-            second,
-            pybullet.JOINT_GEAR,
-            [0, 1, 0],
-            [0, 0, 0],
-            [0, 0, 0],
-            physicsClientId=self.client,
-        )
-        pybullet.changeConstraint(
-            made, gearRatio=-1, erp=0.2, maxForce=1000, physicsClientId=self.client
-        )
-        return made
 
     def read_back(self) -> dict[str, Any]:
         return ReadBack(self).all()
@@ -249,6 +252,8 @@ class PyBullet(Simulator):
             pybullet.resetBaseVelocity(body, row[7:10] - falls, row[10:], c)
 
     def step(self) -> None:
+        if self._passive is not None:
+            self._passive.push()
         if self._anchors is None:
             pybullet.stepSimulation(self.client)
         else:
@@ -274,13 +279,16 @@ class PyBullet(Simulator):
     def save(self) -> tuple[Any, ...]:
         anchors = self._anchors.save() if self._anchors else None
         made = pybullet.saveState(physicsClientId=self.client)
-        return made, self._steps, self._commanded, anchors
+        pushed = self._passive.last if self._passive else None
+        return made, self._steps, self._commanded, anchors, pushed
 
     def restore(self, state: tuple[Any, ...]) -> None:
-        made, self._steps, commanded, anchors = state
+        made, self._steps, commanded, anchors, pushed = state
         pybullet.restoreState(stateId=made, physicsClientId=self.client)
         if self._anchors is not None and anchors is not None:
             self._anchors.restore(anchors)
+        if self._passive is not None:
+            self._passive.last = pushed
         if commanded is not None:  # motor targets are not part of Bullet's state
             self.command(*commanded)
 
@@ -299,10 +307,13 @@ class PyBullet(Simulator):
     def joint_wrenches(self) -> FloatArray:
         if self.prepared is None:
             return np.empty((0, 6))
+        robot = self.prepared.robot
+        if robot.couplings or robot.column("friction").any():
+            raise NotSupportedError("pybullet tells no wrenches of joints that rub or are coupled")
         subspaces = {joint.name: motion_subspace(joint) for joint in self.prepared.joints}
         rows = [
             wrench(self.client, self._robot, joint, subspaces[name])
-            for name, joint in zip(self.prepared.robot.joint_names, self._joints, strict=True)
+            for name, joint in zip(robot.joint_names, self._joints, strict=True)
         ]
         return np.array(rows)
 

@@ -16,6 +16,7 @@ from pytest_simbench.parity import readback
 from pytest_simbench.scene import Coupling, FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import
 
+from .joints import gears
 from .world import inertial_frame, points, pose_of
 
 pybullet = lazy_import("pybullet")
@@ -36,7 +37,7 @@ class ReadBack(readback.ReadBack):
             {name: (number, -1) for name, number in simulator._bodies.items()},
             {name: (self.robot, number) for name, number in simulator._links.items()},
         )
-        self.couplings, self.loops = simulator._couplings, simulator._closures
+        self.gears, self.loops = gears(self.c, simulator._couplings), simulator._closures
         self.held = self._held()
 
     def world(self) -> dict[str, Any]:
@@ -63,7 +64,8 @@ class ReadBack(readback.ReadBack):
         state = pybullet.getJointState(self.robot, joint, physicsClientId=self.c)
         return {
             "limits": info[8:10],
-            "friction": info[6] + info[7],  # a motor has no damping besides
+            # a motor has no damping besides
+            "friction": info[6] + info[7] + self.gears.get((joint, joint), [0.0])[0],
             "initial_position": state[0],
             "axis": self._axis(joint),
         }
@@ -139,15 +141,12 @@ class ReadBack(readback.ReadBack):
             [turn @ np.array(angular)[:, column], turn @ np.array(linear)[:, column]]
         )
 
-    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
-        """Whether the constraints are gears between the fingers."""
-        found = set()
-        for constraint in self.couplings:
-            info = pybullet.getConstraintInfo(constraint, physicsClientId=self.c)
-            if info[0] == info[2] == self.robot and info[4] == pybullet.JOINT_GEAR:
-                found.add(frozenset((info[1], info[3])))
+    def coupling(self, pair: Coupling) -> FloatArray:
+        """Of a gear of both joints, else not a number."""
         joints = dict(zip(self.prepared.robot.joint_names, self.joints, strict=True))
-        return found == {frozenset((joints[p.leader], joints[p.follower])) for p in pairs}
+        both = joints[pair.leader], joints[pair.follower]
+        _, ratio, target = self.gears.get(both, [np.nan] * 3)
+        return np.array([-1.0, target]) / ratio
 
     def _held(self) -> set[int]:
         """Bodies that a constraint holds."""

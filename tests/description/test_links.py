@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 from pytest_simbench.description.links import (
+    check_apart,
     ends,
     joined,
     link_poses,
@@ -27,6 +28,14 @@ from pytest_simbench.simulator import DescriptionError, NotSupportedError, Prepa
 from pytest_simbench.simulator.info import check_supported
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.simulator.settings import Settings
+
+
+def test_a_pair_of_an_unknown_link_is_named_with_those_there_are() -> None:
+    scene = Scene("s", robot=ROBOT, apart=(("ground", "link/elbow"),))
+    with pytest.raises(SceneError, match="'link/elbow' is kept apart, .* no such link; .*link4"):
+        check_apart(scene, PREPARED)
+    check_apart(replace(scene, apart=(("ground", "link/panda_link4"),)), PREPARED)
+
 
 ROBOT = panda(base=Pose.at(0.2, -0.1, 0.3, yaw=0.7))
 PREPARED, MODEL = PreparedRobot(ROBOT), RobotModel(ROBOT)

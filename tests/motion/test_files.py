@@ -155,8 +155,8 @@ def test_a_hand_of_three_fingers_and_one_of_one(tmp_path: Path) -> None:
     urdf = URDF.replace("</robot>", f"{third}</robot>")
     toml = TOML.replace('"right_finger"]', '"right_finger", "third_finger"]')
     robot = read_robot(small_arm(tmp_path, toml, urdf))
-    pairs = (("left_finger", "right_finger"), ("left_finger", "third_finger"))
-    assert robot.gripper.couplings == pairs
+    pairs = [(pair.leader, pair.follower) for pair in robot.gripper.couplings]
+    assert pairs == [("left_finger", "right_finger"), ("left_finger", "third_finger")]
     assert not RobotModel(robot).has_parallel_fingers
     jaw = URDF.replace(
         '<joint name="right_finger" type="prismatic">', '<joint name="right_finger" type="fixed">'

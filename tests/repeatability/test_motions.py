@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.client.world import Motion
-from pytest_simbench.records.repeatability import Difference
+from pytest_simbench.records.repeatability import StateDifference
 from pytest_simbench.repeatability.motions import _first_difference, difference, gaps
 
 NAMES = ("a", "b")
@@ -38,7 +38,7 @@ def circling(step: float, operations: tuple[float, ...] = (0.5, 0.7), radius: fl
 
 
 def test_equal_episodes_do_not_differ() -> None:
-    assert difference(circling(0.02), circling(0.02), NAMES) == Difference()
+    assert difference(circling(0.02), circling(0.02), NAMES) == StateDifference()
     assert gaps(circling(0.02), circling(0.02)).largest().max() == 0
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.recordings.album import Album
-from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.figures import sweep
 from pytest_simbench.report.figures.drawing import FiguresUnavailable, drawing, write
@@ -109,7 +109,7 @@ def test_one_picture_for_all_laws_over_releases_and_its_colours(tmp_path: Path) 
         *row("tower", 0.1, 0.1, None, 0.1),
         *asked("glide", "2.0", 50.0),
     ]
-    (laws,) = found = Report.of(Reading(records=tuple(records))).histories
+    (laws,) = found = Report.of(RunContents(records=tuple(records))).histories
     with drawing():
         (axis,) = draw_laws(laws).axes  # type: ignore[arg-type]
         cells = [[to_hex(cell) for cell in line] for line in axis.images[0].get_array()]

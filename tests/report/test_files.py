@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.measure.limits import Limit
 from pytest_simbench.records.description import TaskDescription
-from pytest_simbench.records.folder import Reading, RunFolder
+from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
@@ -159,14 +159,14 @@ descriptions = st.builds(
 values = st.lists(st.dictionaries(names, numbers, max_size=4), min_size=1, max_size=12)
 
 
-def reading(said: TaskDescription, of: list[dict[str, Any]], **more: Any) -> Reading:
+def reading(said: TaskDescription, of: list[dict[str, Any]], **more: Any) -> RunContents:
     """A run that says one thing and holds another; both as they come from the disk."""
     said = TaskDescription.from_dict(json.loads(json.dumps(said.to_dict())))
     found = [
         record(("mujoco", "drake")[k % 2], k // 2, "task", metrics=item, seed=k // 2, **more)
         for k, item in enumerate(of)
     ]
-    return Reading("run", tuple(found), {"task": said})
+    return RunContents("run", tuple(found), {"task": said})
 
 
 @given(descriptions, values)

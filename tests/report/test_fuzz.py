@@ -29,17 +29,24 @@ from pytest_simbench.recordings.album import Album
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.records import repeatability
 from pytest_simbench.records.baseline import KEY, BaselineError, read_baseline, to_extra_info
-from pytest_simbench.records.choices import Seen
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import TaskDescription, Threshold
-from pytest_simbench.records.folder import CLAIMS, RECORDS, TASKS, THRESHOLDS, Reading, RunFolder
+from pytest_simbench.records.folder import (
+    CLAIMS,
+    RECORDS,
+    TASKS,
+    THRESHOLDS,
+    RunContents,
+    RunFolder,
+)
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, RecordError
+from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.repeatability.agreement import FOLDER as SAMPLES
 from pytest_simbench.report.figures.sheet import albums
 from pytest_simbench.report.files import write_files, write_tables
 from pytest_simbench.report.model.outcome import NAME as OUTCOME
-from pytest_simbench.report.model.outcome import Outcome
+from pytest_simbench.report.model.outcome import RunOutcome
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.terminal.parts import (
     claim_lines,
@@ -102,7 +109,7 @@ def folder() -> Path:
     run.close()
     for line in (LINE, REPLAY):
         repeatability.append(path, line)
-    Outcome(False, "before", compared()).write(path)
+    RunOutcome(False, "before", compared()).write(path)
     figure = Trace.of(scene(), motion(), [(0.0, "pick")])
     figure.write(path, f"traces/{file_stem_of(kept[0])}.npz")
     album = Album()
@@ -125,7 +132,7 @@ def one_sentence(text: str) -> None:
 def report(run: Path) -> None:
     """What `--sim-report` and a comparison do, but for drawing."""
     reading = _read(run)
-    outcome, wrong = Outcome.read(run)
+    outcome, wrong = RunOutcome.read(run)
     told_of = Report.of(reading, outcome.compared)
     found = told_of.records
     written = write_files(run, told_of, figures=False)
@@ -150,12 +157,12 @@ def report(run: Path) -> None:
             run_gate(before.records, found, (Limit("placed", 0.05, True),), METRICS)
 
 
-def _read(run: Path) -> Reading:
+def _read(run: Path) -> RunContents:
     try:
         return RunFolder(run).read()
     except RecordError as error:
         one_sentence(str(error))
-        return Reading()
+        return RunContents()
 
 
 def tried(name: str, content: bytes) -> None:
@@ -185,7 +192,7 @@ def test_the_folder_itself_is_fine() -> None:
         run = Path(copy, "run")
         shutil.copytree(folder(), run)
         assert len(RunFolder(run).read().records) > 5
-        assert Outcome.read(run)[1] == ""
+        assert RunOutcome.read(run)[1] == ""
         assert len(read_baseline(run / BENCHMARKS).records) > 5
         assert write_tables(run, run)[1] == []
         report(run)

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.scene import Box, Pose, Scene, SceneError, Sphere, Trajectory
+from pytest_simbench.scene import Box, Pose, Scene, SceneError, Sphere, Start, Trajectory
+from pytest_simbench.scene.plausibility import implausible
 from pytest_simbench.scene.pose import quaternion_of
 
 
@@ -44,6 +45,38 @@ def test_free_and_fixed_bodies_keep_their_order() -> None:
     scene = Scene("s", (box("b", 0.0), Box("t", (1, 1, 0.1), Pose.at(0, 0, -0.05)), box("a", 1.0)))
     assert [body.name for body in scene.free_bodies] == ["b", "a"]
     assert [body.name for body in scene.fixed_bodies] == ["t"]
+
+
+def test_pairs_kept_apart_may_be_inside_each_other() -> None:
+    bodies = (box("a", 0.0), box("b", 0.01))
+    apart = (("body/b", "body/a"), ("ground", "body/a"))
+    scene = Scene("s", bodies, apart=apart)
+    assert scene.kept_apart("body/a", "body/b")
+    assert not scene.kept_apart("body/b", "ground")
+    assert Scene.from_wire(json.loads(json.dumps(scene.to_wire()))) == scene
+    rows = np.array([[*body.pose.as_array(), *[0.0] * 6] for body in bodies])
+    sunk = rows - [0, 0, 0.1, *[0.0] * 10]
+    assert implausible(scene, rows) is None
+    assert implausible(scene, np.array([sunk[0], rows[1]])) is None
+    assert "'b' is 100 mm deep in the ground" in str(implausible(scene, sunk))
+
+
+@pytest.mark.parametrize("name", ["body/c", "box", "link/hand"])
+def test_a_pair_of_what_is_not_there_is_an_error(name: str) -> None:
+    with pytest.raises(SceneError, match=f"'{name}' is kept apart and not there"):
+        Scene("s", (box("a", 0.0),), apart=(("ground", name),))
+
+
+def test_a_start_moves_bodies_and_joints() -> None:
+    robot = panda()
+    scene = Scene("s", (box("a", 0.0), box("b", 1.0)), robot)
+    positions = tuple(0.1 * k for k in range(len(robot.joints)))
+    started = scene.at_start(Start(("b",), (Pose.at(2.0, 0.0, 0.3),), positions))
+    assert started.body("b").pose.position == (2.0, 0.0, 0.3)
+    assert started.body("a") == scene.body("a")
+    assert started.robot is not None
+    assert [joint.initial_position for joint in started.robot.joints] == list(positions)
+    assert scene.at_start(Start((), ())) == scene
 
 
 def test_a_ground_that_bounces_crosses_and_another_is_not_named() -> None:

@@ -115,7 +115,8 @@ def step(s: Any) -> None:
 
 
 def uncoupled(s: Any) -> None:
-    s._drives.pinion.release()
+    for pinion in s._drives.pinions.values():
+        pinion.release()
 
 
 FAULTS: dict[str, Plant] = {

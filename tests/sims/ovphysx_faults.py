@@ -58,9 +58,7 @@ FAULTS: dict[str, Plant] = {
         "3.587895\nbool physxRigidBody:disableGravity = true",
     ),
     "joint/panda_joint4/friction": stage(
-        "joint_3",
-        "physxJointAxis:angular:armature",
-        "0.1\nfloat physxJointAxis:angular:staticFrictionEffort = 0.5",
+        "joint_3", "physxJointAxis:angular:staticFrictionEffort", "0.5"
     ),
 }
 

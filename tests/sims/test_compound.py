@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -24,7 +23,6 @@ from pytest_simbench.scene import (
     Sphere,
     principal,
 )
-from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
 from tests.conftest import able_to, case_of
@@ -77,26 +75,3 @@ def test_it_is_built_falls_and_rests_on_its_lowest_shape(handle: SimulatorHandle
         world.wait(1.0)
         assert world.pose("thing").position == pytest.approx((0.1, 0.2, 0.06), abs=2e-3)
         assert world.pose("thing").tilt() < 0.02
-
-
-@pytest.mark.parametrize("rule", ["maximum", "minimum"])
-def test_a_slab_slides_as_it_does_where_all_have_the_friction_of_the_pair(
-    handle: SimulatorHandle, rule: str
-) -> None:
-    """Down a slope of 45 degrees, by gravity that leans. Laws say who slides as Coulomb has it."""
-    g = 9.80665 * math.sqrt(0.5)
-
-    def acceleration(own: float, other: float) -> float:
-        slab = Box("slab", (0.2, 0.2, 0.04), Pose.at(0, 0, 0.12), 1.0, own)
-        table = Box("table", (4.0, 1.0, 0.1), Pose.at(1.0, 0, 0.05), friction=other)
-        scene = Scene("pair", (slab, table), None, (g, 0.0, -g), own, friction_rule=rule)
-        assert combined(scene, adapter(handle.case.simulator).info.friction_rule)[1] == ""
-        with handle.episode(scene) as world:
-            world.wait(0.1)
-            before = float(world.bodies[0, 7])
-            world.wait(0.3)
-            return (float(world.bodies[0, 7]) - before) / 0.3
-
-    mu, other = (0.6, 0.3) if rule == "maximum" else (0.3, 0.6)
-    assert acceleration(0.3, 0.6) == pytest.approx(acceleration(mu, mu), rel=0.02)
-    assert acceleration(mu, mu) != pytest.approx(acceleration(other, other), rel=0.1)

@@ -12,10 +12,12 @@ from pytest_simbench.sims.dart import adapter
 from pytest_simbench.sims.dart.adapter import DART
 from pytest_simbench.sims.dart.bodies import add_ground
 
+from pytest_simbench.laws.mechanisms import Part, Y, mechanism
 from pytest_simbench.motion.grasping import grasp_of, grasping
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import known_robot
-from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
+from pytest_simbench.scene import Box, Coupling, FloatArray, Pose, Robot, Scene
+from pytest_simbench.simulator import NotSupportedError
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.testing import scenes
 
@@ -182,3 +184,29 @@ def test_the_ground_is_a_slab_where_cubes_would_sink() -> None:
     for _ in range(1000):
         simulator.step()
     assert simulator.body_state()[0, 2] == pytest.approx(EDGE / 2, abs=1e-4)
+
+
+@pytest.mark.parametrize("heavy", [0.5, 2.0])
+@pytest.mark.parametrize("driven", [False, True])
+def test_a_coupled_joint_carries_the_other(heavy: float, driven: bool) -> None:
+    """Two levers alike but in mass, coupled 1 to 1: free they fall as one lever would, and the
+    drive of one holds both. DART's own coupler throws the follower that is heavier."""
+    drive = {"stiffness": 5000.0, "damping": 100.0, "effort": 100.0} if driven else {}
+    parts = [
+        Part(name, Y, (0.0, y, 0.0), (0.3, 0.0, 0.0), mass, (0.01 * mass,) * 3, on="mount", **more)
+        for name, y, mass, more in (("a", 0.0, 1.0, drive), ("b", 0.5, heavy, {}))
+    ]
+    robot = mechanism("pair", *parts, couplings=(Coupling("b", "a"),))
+    simulator, alone = (
+        world(Scene("pair", robot=robot)),
+        world(Scene("one", robot=mechanism("one", parts[0]))),
+    )
+    for _ in range(300):
+        simulator.step()
+        alone.step()
+    (first, second), right = simulator.joint_state()[0], alone.joint_state()[0, 0]
+    assert second == pytest.approx(first, abs=1e-4)
+    assert first == pytest.approx(right, abs=1e-4)
+    assert (right > 1.0) != driven
+    with pytest.raises(NotSupportedError, match="no wrenches"):
+        simulator.joint_wrenches()

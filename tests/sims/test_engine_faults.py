@@ -102,7 +102,6 @@ ENGINES = {
         pybullet_faults.FaultyPyBullet,
         fixed={
             "link/*/margin": "changeDynamics leaves the margin of a link's shapes as it is",
-            "joint/*/friction": "getJointInfo tells what was loaded, whatever was changed since",
         },
     ),
     "sapien": Engine(sapien_faults.FaultySAPIEN),

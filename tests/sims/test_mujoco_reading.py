@@ -245,6 +245,33 @@ def test_compensated_gravity_is_a_force(tmp_path: Path, share: float) -> None:
     assert body.wrenches[0].force == pytest.approx((0, 0, 9.81 * share * body.mass))
 
 
+def test_parts_whose_gravity_is_compensated_unlike_are_told(tmp_path: Path) -> None:
+    reading = read(tmp_path, SMALL.replace('name="tool"', 'name="tool" gravcomp="1"'))
+    assert reading.scene.body("tool").wrenches == ()
+    assert "body gravcomp (of parts)" in {line.quantity for line in reading.account}
+
+
+def test_the_file_itself_is_borne_once(tmp_path: Path) -> None:
+    text = SMALL.replace('name="box"', 'name="box" gravcomp="1"')
+    simulator = MuJoCo(MuJoCo.profiles["file"])
+    scene = read(tmp_path, text).scene
+    simulator.load(scene)
+    names = [body.name for body in scene.free_bodies]
+    pushed = np.zeros((len(names), 6))
+    pushed[names.index("box"), :3] = scene.body("box").wrenches[0].force
+    for _ in range(50):
+        simulator.push(pushed)
+        simulator.step()
+    states = simulator.body_state()
+    assert abs(states[names.index("box"), 9]) < 1e-6
+    assert states[names.index("ball"), 9] < -0.4
+    declared = [d for d in simulator.info.deviations if d.concerns(scene)]
+    expected = expected_quantities(scene, simulator.settings)
+    wrong = compare(expected, simulator.read_back(), declared, "mujoco").wrong
+    assert not [name for name in wrong if name.endswith("gravity")]
+    simulator.close()
+
+
 NO_PHYSICS = {
     "geom": "alt castshadow classname compiler frame group id info material name parent plugin "
     "rgba signature userdata hfieldname set_frame",

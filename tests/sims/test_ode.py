@@ -18,8 +18,10 @@ from pytest_simbench.sims.ode.adapter import ODE
 from pytest_simbench.sims.ode.contacts import APART, _slip, distinct
 
 from pytest_simbench.client.environments import interpreter
+from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.world import World
-from pytest_simbench.scene import FloatArray, Robot, Trajectory
+from pytest_simbench.laws.mechanisms import Part, Y, mechanism
+from pytest_simbench.scene import Coupling, FloatArray, Robot, Scene, Trajectory
 from pytest_simbench.testing import scenes
 
 from .ode_faults import Mortal, RawTip, Tip
@@ -181,6 +183,32 @@ def test_what_is_left_stands_for_all(contacts: list[Touch]) -> None:
         a.stands_for(b) for k, a in enumerate(kept) for m, b in enumerate(kept) if k != m
     )
     assert [one.depth for one in kept] == sorted((one.depth for one in kept), reverse=True)
+
+
+LEVER = Part("lever", Y, centre=(0.3, 0.0, 0.0))
+ON_LEVER = Part("crossed", (0.0, 0.0, 1.0), (0.6, 0.0, 0.0), (0.3, 0.1, 0.0))
+RACK = Part("rack", (0.0, 0.6, 0.8), (0.0, 0.5, 0.0), slides=True, on="mount")
+
+
+@pytest.mark.parametrize(
+    ("other", "ratio"), [(ON_LEVER, 1.5), (RACK, -0.2), (replace(RACK, axis=Y), 0.3)]
+)
+def test_joints_of_one_link_are_coupled(worlds: Worlds, other: Part, ratio: float) -> None:
+    """Also where it hangs on one of them, and of a hinge and a slider."""
+    robot = mechanism("pair", LEVER, other, couplings=(Coupling(other.name, "lever", ratio),))
+    world = worlds.load(Scene("pair", robot=robot))
+    world.wait(0.3)
+    led, following = world.joints[0]
+    assert abs(led) > 0.1
+    assert following == pytest.approx(ratio * led, abs=3e-3)
+
+
+def test_joints_of_no_common_link_are_refused(worlds: Worlds) -> None:
+    robot = mechanism(
+        "far", LEVER, ON_LEVER, replace(RACK, on=None), couplings=(Coupling("rack", "lever"),)
+    )
+    with pytest.raises(EngineFailed, match="rack and lever have none in common"):
+        worlds.load(Scene("far", robot=robot))
 
 
 def test_slip_is_along_the_surface_whatever_its_direction() -> None:

@@ -1,5 +1,6 @@
 """What only PyBullet's adapter has to show: its motors keep the effort limits, which Bullet does
-not report, and parity faults of links that the common tests do not plant."""
+not report; springs and dampers that it pushes itself; parity faults of links and gears that the
+common tests do not plant."""
 
 from __future__ import annotations
 
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 from pytest_simbench.sims.pybullet.adapter import PyBullet
 
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.laws.mechanisms import Part, Y, mechanism
+from pytest_simbench.scene import Box, Coupling, FloatArray, Pose, Robot, Scene
+from pytest_simbench.simulator import NotSupportedError
 from pytest_simbench.tasks import Jitter, Throwing
 from pytest_simbench.testing import scenes
 
@@ -125,3 +128,69 @@ def test_contacts_turn_with_the_hand() -> None:
         assert min(along) > np.cos(0.5), along
     finally:
         simulator.close()
+
+
+LIGHT = Part("light", Y, centre=(0.03, 0.0, 0.0), mass=0.01, inertia=(1e-6,) * 3, on="mount",
+             passive_damping=0.01)  # fmt: skip
+"""A lever of 10 g that a step of 1/240 s of its damping would stop four times over."""
+
+
+def built(robot: Robot, *bodies: Box) -> PyBullet:
+    simulator = PyBullet(PyBullet.profiles["tuned"])
+    simulator.load(Scene(robot.name, bodies, robot))
+    return simulator
+
+
+def stepped(simulator: PyBullet, seconds: float) -> FloatArray:
+    for _ in range(round(240 * seconds)):
+        simulator.step()
+    return simulator.joint_state()
+
+
+def test_a_damper_that_a_step_outruns_does_not_throw_its_joint() -> None:
+    """The weight turns the lever at torque / damping."""
+    angle, speed = stepped(built(mechanism("light", LIGHT)), 0.5)[:, 0]
+    assert 0.1 < angle < 0.2
+    assert speed == pytest.approx(0.01 * 9.80665 * 0.03 * np.cos(angle) / 0.01, rel=0.02)
+
+
+def test_what_blocks_a_damped_joint_feels_all_of_its_spring() -> None:
+    """A press of 0.1 kg whose spring pushes with 20 N on a table, damped by 50 N s/m: two thirds
+    of the force are lost where a damper takes a blocked joint for a free one."""
+    press = Part("press", (0.0, 0.0, 1.0), mass=0.1, slides=True, shape=(0.1, 0.1, 0.1),
+                 passive_damping=50.0, spring=400.0, rest=-0.4)  # fmt: skip
+    simulator = built(
+        mechanism("press", press, base=Pose.at(0.0, 0.0, 0.6)),
+        Box("table", (0.4, 0.4, 0.2), Pose.at(0.0, 0.0, 0.1)),
+    )
+    assert stepped(simulator, 1.0)[0] == pytest.approx(-0.35, abs=1e-3)
+    force = sum(abs(wrench[2]) for *_, wrench in simulator.contact_forces())
+    assert force == pytest.approx(0.1 * 9.80665 + 400 * 0.05, rel=0.01)
+
+
+def test_restored_springs_and_dampers_go_on_as_they_were() -> None:
+    simulator = built(mechanism("light", LIGHT))
+    stepped(simulator, 0.1)
+    saved = simulator.save()
+    straight = stepped(simulator, 0.2)
+    simulator.restore(saved)
+    assert np.array_equal(stepped(simulator, 0.2), straight)
+
+
+def test_gears_are_read_and_joints_with_them_have_no_wrenches() -> None:
+    import pybullet
+
+    rubs = Part("rubs", Y, friction=3.0, on="mount")
+    robot = mechanism("geared", LIGHT, rubs, couplings=(Coupling("rubs", "light", 2.0, 0.0),))
+    simulator = built(robot)
+    told = simulator.read_back()
+    assert told["coupling/rubs"] == pytest.approx([2.0, 0.0])
+    assert (told["joint/light/friction"], told["joint/rubs/friction"]) == (0.0, 3.0)
+    with pytest.raises(NotSupportedError, match="no wrenches"):
+        simulator.joint_wrenches()
+    coupling, friction = simulator._couplings
+    pybullet.changeConstraint(coupling, gearRatio=-1.0, physicsClientId=simulator.client)
+    pybullet.changeConstraint(friction, maxForce=4.0, physicsClientId=simulator.client)
+    told = simulator.read_back()
+    assert told["coupling/rubs"] == pytest.approx([1.0, 0.0])
+    assert told["joint/rubs/friction"] == 4.0

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
@@ -83,18 +82,10 @@ HANDS = {
 """A hand that only touches, one jaw, two fingers, three."""
 
 
-COUPLED = {"ode": {0, 1, 2}}
-"""Engines that couple these numbers of fingers alone, and say so."""
-
-
 def test_hands_of_any_number_of_fingers(handle: SimulatorHandle, tmp_path: Path) -> None:
     """All fingers stand at one position (1 mm) though the first is told another one."""
     for count, (urdf, toml) in HANDS.items():
         robot = read_robot(small_arm(tmp_path, toml, urdf))
-        if count not in COUPLED.get(handle.case.simulator, HANDS):
-            with pytest.raises(EngineFailed, match=f"couples two fingers at most; .* has {count}"):
-                handle.world(Scene("hands", (), robot))
-            continue
         world = handle.world(Scene("hands", (), robot))
         assert world.joints.shape == (2, 3 + count)
         goal = robot.column("initial_position")

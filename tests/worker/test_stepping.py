@@ -277,6 +277,14 @@ def test_a_force_is_told_while_it_acts_and_once_that_it_ended() -> None:
     assert told(PULLED, 8).pushed == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
 
 
+def test_a_force_from_the_start_on_is_not_told_before_the_first_step() -> None:
+    """Engines that add up forces would have it twice in that step."""
+    pulled = PULLED.bodies[0].changed(wrenches=(Wrench(force=(0.5, 0.0, 0.0)),))
+    simulator = Told()
+    assert Acting.of(simulator, Scene("s", (pulled,)))
+    assert simulator.pushed == [0.0]
+
+
 def test_it_is_told_in_each_step_of_a_wait() -> None:
     simulator = Told()
     acting = Acting.of(simulator, PULLED)

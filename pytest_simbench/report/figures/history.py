@@ -9,9 +9,9 @@ from typing import Any
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
 from pytest_simbench.measure.history import (
-    Course,
     History,
     LawHistory,
+    MetricCourse,
     Reached,
     TaskHistory,
     times,
@@ -71,7 +71,7 @@ def draw(history: TaskHistory) -> Any:
     return figure
 
 
-def _panel(axis: Any, course: Course) -> None:
+def _panel(axis: Any, course: MetricCourse) -> None:
     metric = course.metric
     scale = 100 if metric.bounded else 1
     present = [place for place, values in enumerate(course.values) if values]

@@ -11,7 +11,7 @@ from math import isfinite
 from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.records.claims import Claim
-from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import COSTS, Metric, significant
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped
@@ -91,7 +91,7 @@ class _Told:
         return f"{significant(scale * claim.mean)}{bounds}"
 
 
-def claims_of(reading: Reading, comparison: GateReport | None = None) -> Claims:
+def claims_of(reading: RunContents, comparison: GateReport | None = None) -> Claims:
     """Of a run, with the limits against its baseline."""
     claims = _that_count(reading.claims)
     told = [_told(claim, claims, reading.metrics) for claim in claims]

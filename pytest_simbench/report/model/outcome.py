@@ -27,7 +27,7 @@ LARGEST = 64 * 2**20
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """How a run ended.
 
     Attributes:
@@ -62,7 +62,7 @@ class Outcome:
         write_whole(folder, NAME, json.dumps(found).encode())
 
     @classmethod
-    def read(cls, folder: Path) -> tuple[Outcome, str]:
+    def read(cls, folder: Path) -> tuple[RunOutcome, str]:
         """That of a run folder, which anybody may have made; and what is wrong with it, or "".
 
         A folder without one says nothing.

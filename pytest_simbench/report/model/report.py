@@ -9,7 +9,7 @@ from pytest_simbench.measure.history import History, histories, law_histories
 from pytest_simbench.measure.settling import TASK as SETTLING
 from pytest_simbench.measure.settling import Settled, settlings
 from pytest_simbench.measure.sweep import Swept, sweeps
-from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.model import settling, sweep, tables, truth
 from pytest_simbench.report.model.claims import Claims, claims_of
@@ -41,7 +41,7 @@ class Report:
     comparison: Compared | None = None
 
     @classmethod
-    def of(cls, reading: Reading, comparison: Compared | None = None, looks: int = 1) -> Report:
+    def of(cls, reading: RunContents, comparison: Compared | None = None, looks: int = 1) -> Report:
         """What a run folder holds, that was judged so often (`outcome.Outcome`)."""
         # However many processes wrote them.
         records = sorted(reading.records, key=lambda r: (r.test, r.repetition))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 from pytest_simbench.measure.convergence import Convergence
-from pytest_simbench.measure.sweep import REFERENCE, Choice, Line, Point, Swept, choice
+from pytest_simbench.measure.sweep import REFERENCE, Point, StepChoice, SweepLine, Swept, choice
 from pytest_simbench.records.phenomena import ordered
 from pytest_simbench.records.series import step_text
 from pytest_simbench.report.model import cells
@@ -54,7 +54,7 @@ def details(found: Sequence[Swept]) -> list[Table]:
     """For each phenomenon its laws by simulators: the order, the cheapest step that keeps the law
     with its own tolerance, and with that of `REFERENCE`; then what no step helps, and what failed.
     """
-    kinds: dict[str, Callable[[Swept, Line], Content]] = {
+    kinds: dict[str, Callable[[Swept, SweepLine], Content]] = {
         "order of convergence": lambda law, line: _order(line.order),
         "cheapest step that keeps the law, CPU s/sim s": lambda law, line: _step(
             line.cheapest_kept
@@ -131,7 +131,7 @@ def labels(found: Sequence[Swept]) -> dict[Who, str]:
     return dict(zip(every, names(places), strict=True))
 
 
-def _choice(found: Choice | None) -> list[str]:
+def _choice(found: StepChoice | None) -> list[str]:
     if found is None:
         return [cells.MISSING]
     if not found.kept:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean
 
-from pytest_simbench.measure.phenomena import KEPT, Ratios, Verdict, verdict, worst
+from pytest_simbench.measure.phenomena import KEPT, PhenomenonVerdict, Ratios, verdict, worst
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.phenomena import ordered
 from pytest_simbench.records.series import grouped
@@ -169,7 +169,7 @@ def _unit(summary: TaskSummary) -> str:
     return next((metric.unit for metric in summary.metrics if metric.name == "error"), "")
 
 
-def _told(found: Verdict, costs: Mapping[str, float | None]) -> str:
+def _told(found: PhenomenonVerdict, costs: Mapping[str, float | None]) -> str:
     if found.best is not None:
         text = f"{found.best}, which keeps {found.kept[found.best]} of {found.laws} laws"
     else:

@@ -8,7 +8,7 @@ import pytest
 
 from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.records.claims import Claim
-from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Failure
 from pytest_simbench.report.markdown.run import render_claims
 from pytest_simbench.report.model.claims import claims_of
@@ -50,11 +50,11 @@ RECORDS = (
 FAILED = claim("drake", "FAIL", mean=0.5, low=0.3, high=0.7, n=2)
 
 
-def reading(*claims: Claim, records: Any = RECORDS) -> Reading:
+def reading(*claims: Claim, records: Any = RECORDS) -> RunContents:
     from pytest_simbench.records.description import TaskDescription
 
     tasks = {name: TaskDescription(name, metrics) for name, metrics in METRICS.items()}
-    return Reading(records=records, tasks=tasks, claims=claims)
+    return RunContents(records=records, tasks=tasks, claims=claims)
 
 
 def test_the_first_line_says_pass_or_fail_and_how_many_crashed() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.measure.sweep import Swept, sweeps
-from pytest_simbench.records.folder import Reading
+from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENON
@@ -204,7 +204,7 @@ def test_releases_are_told_in_lines_and_in_markdown() -> None:
         *row("tower", 0.1, 0.1, None, 0.1),
         *asked("glide", "2.0", 50.0),
     ]
-    found = Report.of(Reading(records=tuple(records))).histories
+    found = Report.of(RunContents(records=tuple(records))).histories
     assert history_lines(found, 60)[:2] == [
         "engine, 3 laws (headless tuned): 4 releases, 1.2 to 2.0",
         "  1.10: tower fails (0.1x before): WorkerHung: no answer for",

@@ -14,7 +14,7 @@ import pytest
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import Limit
 from pytest_simbench.report.model.changes import columns
-from pytest_simbench.report.model.outcome import NAME, Outcome
+from pytest_simbench.report.model.outcome import NAME, RunOutcome
 from tests.report.samples import METRICS, record
 
 
@@ -30,9 +30,9 @@ def test_it_is_read_back(passed: bool | None, tmp_path: Path) -> None:
     report = compared()
     assert report.failures
     assert report.differences
-    outcome = Outcome(passed, "runs/before", report, looks=2)
+    outcome = RunOutcome(passed, "runs/before", report, looks=2)
     outcome.write(tmp_path)
-    found, problem = Outcome.read(tmp_path)
+    found, problem = RunOutcome.read(tmp_path)
     assert problem == ""
     assert found == outcome
     assert found.comparison is not None
@@ -43,23 +43,23 @@ def test_it_is_read_back(passed: bool | None, tmp_path: Path) -> None:
 def test_a_loss_without_bounds_is_kept(tmp_path: Path) -> None:
     report = compared()
     change = replace(report.changes[0], loss=math.inf)
-    Outcome(False, "b", replace(report, changes=(change,))).write(tmp_path)
-    found, _ = Outcome.read(tmp_path)
+    RunOutcome(False, "b", replace(report, changes=(change,))).write(tmp_path)
+    found, _ = RunOutcome.read(tmp_path)
     assert found.comparison is not None
     assert found.comparison.changes == (change,)
 
 
 def test_a_folder_without_one_says_nothing(tmp_path: Path) -> None:
-    assert Outcome.read(tmp_path) == (Outcome(), "")
-    Outcome(True).write(tmp_path)
-    assert Outcome.read(tmp_path) == (Outcome(True), "")
-    assert Outcome(True).compared is None
+    assert RunOutcome.read(tmp_path) == (RunOutcome(), "")
+    RunOutcome(True).write(tmp_path)
+    assert RunOutcome.read(tmp_path) == (RunOutcome(True), "")
+    assert RunOutcome(True).compared is None
 
 
 def spoilt(**changes: Any) -> str:
     """What is written of a comparison, with a part of its first change replaced."""
     with TemporaryDirectory() as folder:
-        Outcome(True, "b", compared()).write(Path(folder))
+        RunOutcome(True, "b", compared()).write(Path(folder))
         data = json.loads((Path(folder) / NAME).read_text())
     data["comparison"]["changes"][0].update(changes)
     return json.dumps(data)
@@ -82,15 +82,15 @@ def spoilt(**changes: Any) -> str:
 )
 def test_what_is_none_is_told(text: str, told: str, tmp_path: Path) -> None:
     (tmp_path / NAME).write_text(text)
-    found, problem = Outcome.read(tmp_path)
-    assert found == Outcome()
+    found, problem = RunOutcome.read(tmp_path)
+    assert found == RunOutcome()
     assert told in problem
 
 
 def test_it_leads_nowhere_else(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
-    Outcome(True).write(tmp_path)
+    RunOutcome(True).write(tmp_path)
     (tmp_path / "run" / NAME).symlink_to(tmp_path / NAME)
-    found, problem = Outcome.read(tmp_path / "run")
-    assert found == Outcome()
+    found, problem = RunOutcome.read(tmp_path / "run")
+    assert found == RunOutcome()
     assert "leads out of its folder" in problem
