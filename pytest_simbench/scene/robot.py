@@ -24,6 +24,9 @@ WIDEST = 6.0
 FARTHEST = 10.0
 """Limits of a slider without any [m]."""
 
+FASTEST = 1000.0
+"""Largest speed of a joint, which a file does not limit [rad/s or m/s]."""
+
 FREE = 1e-6
 """Stiffness [N m/rad, N/m] and largest effort [N m, N] of a drive that leaves its joint free: less
 than a millionth of all that acts here. Of 0, engines that divide by a stiffness make no number, and

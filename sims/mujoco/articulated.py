@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pytest_simbench.description import rounded
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED
 from pytest_simbench.description.robot_files import digest, keep
 from pytest_simbench.description.stl import written_stl
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape, write_joint, write_link
 from pytest_simbench.scene import FloatArray, Gripper, Joint, Polytope, Pose, Robot
-from pytest_simbench.scene.polytope import MOST
 from pytest_simbench.scene.pose import vector3
-from pytest_simbench.scene.robot import FARTHEST, FREE, WIDEST
+from pytest_simbench.scene.robot import FARTHEST, FASTEST, FREE, WIDEST
 from pytest_simbench.simulator import lazy_import
 
 from .actuators import Drive, drive_of
@@ -32,9 +32,6 @@ mujoco = lazy_import("mujoco")
 
 MOUNT = "mount"
 """The link that is fixed in the world."""
-
-FASTEST = 1000.0
-"""Largest speed of a joint, which a file does not limit [rad/s or m/s]."""
 
 BETWEEN = 1e-3
 """Share of a body's mass and inertia that a link between two of its joints has."""
@@ -195,16 +192,10 @@ class Tree:
         kind = kinds(self.model.geom_type[geom])
         if kind == kinds.mjGEOM_BOX:
             return Shape(pose, size=(2 * a, 2 * b, 2 * c))
-        ways = directions(MOST)
         if kind == kinds.mjGEOM_CYLINDER:
-            angles = np.linspace(0, 2 * np.pi, MOST // 2, endpoint=False)
-            ring = a * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-            ends = [np.hstack([ring, np.full((len(ring), 1), z)]) for z in (-b, b)]
-            points, gap = np.concatenate(ends), a * (1 - np.cos(np.pi / len(ring)))
+            points, gap = rounded.cylinder(a, b)
         elif kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE):
-            half = b if kind == kinds.mjGEOM_CAPSULE else 0.0
-            points = a * ways + np.array([0.0, 0.0, half]) * np.sign(ways[:, 2:])
-            gap = a * (1 - float((directions(400) @ ways.T).max(axis=1).min()))
+            points, gap = rounded.capsule(a, b if kind == kinds.mjGEOM_CAPSULE else 0.0)
         elif kind == kinds.mjGEOM_MESH:
             corners, own = self.reading.hull(geom)
             points, gap, pose = np.array(corners), 0.0, pose * own
@@ -267,10 +258,3 @@ class Tree:
             gap = 1000 * max(self._coarse.values())
             reason = f"round shapes of links are hulls of corners, up to {gap:.2g} mm smaller"
             tell("geom size (round, of links)", APPROXIMATED, reason, self._coarse)
-
-
-def directions(count: int) -> FloatArray:
-    """Unit vectors, spread evenly over all directions (a spiral), (count, 3)."""
-    z = 1 - (2 * np.arange(count) + 1) / count
-    angle, flat = np.pi * (3 - np.sqrt(5)) * np.arange(count), np.sqrt(1 - z**2)
-    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)

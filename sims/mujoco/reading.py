@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
+from pytest_simbench.description.rounded import directions
 from pytest_simbench.description.urdf import ROOT
 from pytest_simbench.scene import (
     Body,
@@ -38,7 +39,7 @@ from pytest_simbench.scene.scene import ROOM
 from pytest_simbench.simulator import DescriptionError, lazy_import
 
 from .account import tell_the_rest, values_of
-from .articulated import MOUNT, OnJoint, Tree, directions, on_joints
+from .articulated import MOUNT, OnJoint, Tree, on_joints
 from .touching import apart
 
 mujoco = lazy_import("mujoco")
