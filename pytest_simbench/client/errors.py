@@ -99,7 +99,13 @@ class BadState(WorkerError):
 
 
 class EngineFailed(WorkerError):
-    """The engine or its adapter raised an exception, or rejected the scene or settings."""
+    """The engine or its adapter raised an exception, or rejected the scene or settings.
+
+    Attributes:
+        remote: name of the exception's class in the worker.
+    """
+
+    remote = ""
 
 
 class ExecutorError(Exception):

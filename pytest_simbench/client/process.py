@@ -273,7 +273,10 @@ class WorkerProcess:
 
     def _remote_error(self, error: dict[str, str]) -> WorkerError:
         kind = REMOTE_ERRORS.get(error["type"], EngineFailed)
-        return kind(error["message"], self.where, self.launch.log_tail())
+        found = kind(error["message"], self.where, self.launch.log_tail())
+        if isinstance(found, EngineFailed):
+            found.remote = error["type"]
+        return found
 
     def _hung(self, limit: float) -> WorkerError:
         what = (

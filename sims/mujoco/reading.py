@@ -374,7 +374,9 @@ class Reading:
             self.lift = -float(data.geom_xpos[self.ground, 2])
             friction = float(model.geom_friction[self.ground, 0])
         else:
-            lowest = [-float(p.body.reach_placed(down)[0]) for p in moved if p.root]
+            lowest = [-float(p.body.reach_placed(down)[0]) for p in moved]
+            of_links = [geom for link in self.links for geom in self.geoms_of(link)]
+            lowest += (data.geom_xpos[of_links, 2] - model.geom_rbound[of_links]).tolist()
             self.lift = max(0.0, -min(lowest, default=0.0))
             friction = max((p.body.friction for p in placed), default=1.0)
             reason = "the file has none; a level ground at z = 0 is there, which free bodies touch"
