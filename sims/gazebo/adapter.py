@@ -78,6 +78,9 @@ class Gazebo(Simulator):
             Deviation(
                 "", "the adapter gives joints no springs: SDF's were not tried", only="spring"
             ),
+            Deviation(
+                "", "the adapter commands velocities: it holds what has a motor alone", only="motor"
+            ),
             Deviation("body/*/margin", "Gazebo's boxes and round shapes have no margin outside"),
             Deviation(
                 "link/*/margin",
