@@ -12,9 +12,9 @@ from pytest_simbench.client.display import Displays
 from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.launch import Launch
 from pytest_simbench.ground.names import file_name
-from pytest_simbench.records.choices import FIRST_SEED
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.series import short
+from pytest_simbench.records.tuned_on import FIRST_SEED
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter, address
 from pytest_simbench.tasks.base import Task

@@ -34,7 +34,8 @@ base is the link `base`, whose frame is the world's.
 - axis: velocity of the joint's child link at unit joint speed, angular before linear, in that
   link's frame, (6,).
 - stiffness and damping of a joint: of its drive and all else that pulls in proportion to position
-  and velocity; friction: what resists its motion beside that [N m, N].
+  and velocity; friction: what resists its motion beside that [N m, N]. A joint's own friction
+  replaces that of the settings.
 - points: of a closure of the robot, by its number from 0 on: those that are held together, each in
   its link's frame, (2, 3) [m].
 - coupled: 1 if the fingers are. coupling: ratio and offset of a joint to its leader, (2,).
@@ -88,6 +89,8 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
         quantities |= _robot_quantities(prepared.robot, prepared)
     quantities |= touches(scene, prepared, lambda a, b: _collide(scene, prepared, a, b))
     own = {f"body/{body.name}/damping" for body in scene.free_bodies if body.damping.any()}
+    joints = () if scene.robot is None else scene.robot.joints
+    own |= {f"joint/{joint.name}/friction" for joint in joints if joint.friction}
     for pattern, value in settings.quantities().items():
         meant = {name for name in quantities if fnmatchcase(name, pattern)}
         quantities |= dict.fromkeys(meant - own, value)

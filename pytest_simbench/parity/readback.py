@@ -106,10 +106,13 @@ class ReadBack(ABC):
 
     def coupled(self, pairs: tuple[Coupling, ...]) -> bool | None:
         """Whether the fingers of each pair are coupled; None: the engine does not tell."""
-        return None
+        found = [self.coupling(pair) for pair in pairs]
+        if any(told is None for told in found):
+            return None
+        return all(np.array_equal(told, [1.0, 0.0]) for told in found if told is not None)
 
     def coupling(self, pair: Coupling) -> FloatArray | None:
-        """Ratio and offset of two other joints, (2,); None: the engine does not tell."""
+        """Ratio and offset of two joints, (2,); None: the engine does not tell."""
         return None
 
     def touches(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import pytest
 
 from pytest_simbench.cli import values as read
 from pytest_simbench.cli.values import AUTO_LIMIT, MOST_REPETITIONS, BadValue
-from pytest_simbench.records.choices import FIRST_SEED
+from pytest_simbench.records.tuned_on import FIRST_SEED
 
 LARGEST_SEED = 2**53 - MOST_REPETITIONS - 1
 """The seed of every repetition is then a whole number that any reader of JSON keeps."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pytest_simbench.records.choices import Sample, Seen
 from pytest_simbench.records.readings import Reading
+from pytest_simbench.records.tuned_on import Sample, Seen
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from pytest_simbench.ground.errors import (
     StateError,
     UnavailableError,
 )
-from pytest_simbench.records.choices import Seen
+from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.simulator.base import Simulator, chosen_on, heavy, lazy_import
 from pytest_simbench.simulator.info import FOLLOWER, Capability, Deviation, SimulatorInfo
 from pytest_simbench.simulator.settings import Settings

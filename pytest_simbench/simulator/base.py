@@ -16,7 +16,7 @@ from pytest_simbench.description.carried import Carried
 from pytest_simbench.description.links import check_apart
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.ground.errors import NotSupportedError
-from pytest_simbench.records.choices import Seen
+from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.scene import FloatArray, Scene, Vector3
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.settings import Settings

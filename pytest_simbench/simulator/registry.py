@@ -12,7 +12,7 @@ from typing import Any
 
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.ground.versions import VersionedName, base_name
-from pytest_simbench.records.choices import Seen
+from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.simulator.base import Simulator
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.settings import Settings, changed, profile

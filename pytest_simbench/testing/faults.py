@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -227,8 +227,8 @@ def _text(values: FloatArray) -> str:
 
 
 def robot_faults(robot: Robot) -> dict[str, Fault]:
-    """Faults of the middle joint of an arm, of the link that it moves, of the base and the fingers.
-    No two concern one quantity, so one world holds them all."""
+    """Faults of the middle joint of an arm, of the link that it moves, of the base and the
+    fingers."""
     first, middle = robot.arm_joints[0].name, robot.arm_joints[len(robot.arm_joints) // 2].name
     children = {joint.name: joint.child for joint in PreparedRobot(robot).joints}
     moved, fingers = children[middle], robot.gripper.joints
@@ -351,14 +351,16 @@ FAULTS: dict[str, Fault] = {
 """By short names."""
 
 
-def rounds(capabilities: Collection[Capability]) -> list[dict[str, Fault]]:
-    """`FAULTS` of an engine in as few worlds as there are of one quantity: worlds may be dear to
+def rounds(
+    capabilities: Collection[Capability], faults: Mapping[str, Fault] = FAULTS
+) -> list[dict[str, Fault]]:
+    """The faults of an engine in as few worlds as there are of one quantity: worlds may be dear to
     build.
 
     No two of a round concern one quantity, so each must be seen beside the others.
     """
     found: list[dict[str, Fault]] = []
-    possible = (item for item in FAULTS.items() if item[1].needs in (None, *capabilities))
+    possible = (item for item in faults.items() if item[1].needs in (None, *capabilities))
     for name, fault in possible:
         for group in found:
             if fault.quantity not in {other.quantity for other in group.values()}:

@@ -14,7 +14,7 @@ from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import any_robot, check
 from pytest_simbench.testing.contract import SINGLE
-from pytest_simbench.testing.faults import Fault, robot_faults, rounds, true_scene
+from pytest_simbench.testing.faults import FAULTS, Fault, robot_faults, rounds, true_scene
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require
 
@@ -23,6 +23,14 @@ from pytest_simbench.testing.subject import Subject, require
 def parity_of_full_scene(subject: Subject) -> None:
     """A world with robot, fixed and free bodies, odd sizes and tilted gravity passes parity."""
     with subject.world(_truth(subject)):
+        pass  # loading checks parity
+
+
+@check(Capability.SELF_COLLIDE, any_robot)
+def parity_where_links_collide(subject: Subject) -> None:
+    """The robot alone passes parity where its links collide with each other, but for those that one
+    joint joins, also where some of them overlap."""
+    with subject.world(Scene("colliding", robot=replace(subject.arm, self_collide=True))):
         pass  # loading checks parity
 
 
@@ -80,7 +88,7 @@ def planted_faults_are_seen(subject: Subject) -> None:
     missed = []
     robot, capabilities = subject.robot, subject.cls.info.capabilities
     lacking = [deviation for deviation in subject.cls.info.deviations if deviation.only]
-    for faults in [robot_faults(robot)] if robot else rounds(capabilities):
+    for faults in rounds(capabilities, robot_faults(robot) if robot else FAULTS):
         found = planted(subject, faults.values())
         for name, fault in faults.items():
             if any(fault.word == d.only and d.within is None for d in lacking):

@@ -49,7 +49,7 @@ class Drake(Simulator):
         friction_rule="harmonic",
         capabilities=Capability.named(
             "window offscreen save_restore exact_restore contact_count contact_forces compound "
-            "loops self_collide joint_wrenches deterministic"
+            "loops couplings apart self_collide joint_wrenches deterministic"
         ),
         deviations=(
             Deviation(
@@ -62,9 +62,9 @@ class Drake(Simulator):
                 "largest moment of inertia, too strong about the others",
                 only="damping",
             ),
-            Deviation("joint/*/friction", "Drake's joints have no friction"),
             Deviation("link/*/damping", "Drake has no damping of links"),
             Deviation("closure/*", "pydrake tells nothing of a ball constraint", only="loop"),
+            Deviation("coupling/*", "pydrake tells nothing of a coupler", only="coupling"),
             Deviation(
                 "body/*/boxes",
                 "tuned: corners of free boxes are cut by 0.1 mm a face and rounded by a sphere",
@@ -132,8 +132,9 @@ class Drake(Simulator):
         self.plant.SetPositionsAndVelocities(self.context, state)
         targets = self.plant.get_desired_state_input_port(self.world.model)
         efforts = self.plant.get_actuation_input_port(self.world.model)
-        self._targets = targets.FixValue(self.context, np.concatenate([initial, rest]))
-        self._efforts = efforts.FixValue(self.context, rest)
+        idle = np.zeros(len(self.world.brakes))
+        self._targets = targets.FixValue(self.context, np.concatenate([idle, initial, idle, rest]))
+        self._efforts = efforts.FixValue(self.context, np.concatenate([idle, rest]))
         self._commanded = (initial, rest, rest)
 
     def read_back(self) -> dict[str, Any]:
@@ -141,10 +142,10 @@ class Drake(Simulator):
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._commanded = (position, velocity, effort)
-        self._targets.GetMutableData().get_mutable_value().SetFromVector(
-            np.concatenate([position, velocity])
-        )
-        self._efforts.GetMutableData().get_mutable_value().SetFromVector(effort)
+        driven = -len(position)  # after the brakes of joints with friction
+        targets = _values(self._targets).reshape(2, -1)
+        targets[0, driven:], targets[1, driven:] = position, velocity
+        _values(self._efforts)[driven:] = effort
 
     def push(self, wrenches: FloatArray) -> None:
         forces = np.zeros(self.plant.num_velocities())
@@ -266,3 +267,9 @@ class Drake(Simulator):
             if name not in ("settings", "gui"):
                 delattr(self, name)
         gc.collect()  # pydrake's parts keep each other alive; Meshcat would keep its port
+
+
+def _values(fixed: Any) -> FloatArray:
+    """What a fixed port holds, to be changed in place."""
+    values: FloatArray = fixed.GetMutableData().get_mutable_value().get_mutable_value()
+    return values

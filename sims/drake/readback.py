@@ -96,20 +96,22 @@ class ReadBack(readback.ReadBack):
 
     def joint(self, name: str) -> dict[str, Any]:
         joint, drive = self.made.joints[name], self.made.drives[name]
-        gains = drive.get_controller_gains()
+        gains, own = drive.get_controller_gains(), self.made.springs.get(name)
+        brake = self.made.brakes.get(name)
         return {
             "axis": _axis(joint),
             "limits": [joint.position_lower_limits()[0], joint.position_upper_limits()[0]],
             "effort_limit": drive.effort_limit(),
-            "stiffness": gains.p,
+            "stiffness": gains.p + (0.0 if own is None else _stiffness(own, self.context)),
             "damping": gains.d + joint.GetDampingVector(self.context)[0],
+            "friction": 0.0 if brake is None else brake.effort_limit(),
             "armature": drive.calc_reflected_inertia(self.context),
             "initial_position": joint.GetOnePosition(self.context),
         }
 
     def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
         active = self.plant.GetConstraintActiveStatus
-        return all(active(self.context, made) for made in self.made.couplings)
+        return all(active(self.context, made) for made in self.made.couplings[: len(pairs)])
 
     def pose(self, part: Part) -> list[float]:
         place = self.plant.EvalBodyPoseInWorld(self.context, part.body) @ part.frame
@@ -175,6 +177,12 @@ class ReadBack(readback.ReadBack):
     def _solids(self, part: Part) -> list[Any]:
         """Its shapes but the spheres in corners, which do not collide with each other."""
         return [made for made in part.shapes if made not in self.made.spheres]
+
+
+def _stiffness(spring: Any, context: Any) -> float:
+    """Of a spring in a joint; those of hinges tell it as a parameter from release to release."""
+    told = spring.GetStiffness(context) if hasattr(spring, "GetStiffness") else spring.stiffness()
+    return float(told)
 
 
 def _axis(joint: Any) -> FloatArray:

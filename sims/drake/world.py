@@ -19,10 +19,12 @@ from pytest_simbench.scene import (
     ConvexMesh,
     Cylinder,
     FloatArray,
+    Joint,
     Pose,
     Scene,
     Sphere,
 )
+from pytest_simbench.scene.robot import FREE
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, heavy, lazy_import
 
 from .settings import DrakeSettings, without_sampled_ports
@@ -39,6 +41,9 @@ LIGHT = (0.85, 0.85, 0.85, 1.0)
 LAYER = 0.05
 """How deep the ground gives way where surfaces are compliant [m]; Drake has no default."""
 
+CREEP = 1e-4
+"""Speed at which a joint slips under its whole friction [rad/s, m/s]: Drake's own for contacts."""
+
 VERTEX_RADIUS = 1e-6
 """Of the spheres at the vertices of free meshes [m]: they stick out by no more than that."""
 
@@ -54,7 +59,8 @@ class World:
             the world body.
         shapes: geometry ids by name of the box or link that they belong to, or "ground".
         model: the robot's model instance.
-        couplings: ids of the constraints between the fingers.
+        springs, brakes: what gives joints a spring and friction of their own, by their names.
+        couplings: ids of the constraints between joints.
     """
 
     def __init__(
@@ -74,6 +80,8 @@ class World:
         self.links: dict[str, Any] = {}
         self.joints: dict[str, Any] = {}
         self.drives: dict[str, Any] = {}
+        self.springs: dict[str, Any] = {}
+        self.brakes: dict[str, Any] = {}
         if self.prepared is not None:
             self._add_links(self.prepared)
             self._add_joints(self.prepared)
@@ -229,18 +237,36 @@ class World:
             if s.pad_radius and joint.name in robot.gripper.joints:
                 centres = pad_centres(prepared, joint, s.pad_radius)
                 self._add_spheres(child, joint.child, centres, s.pad_radius, robot.friction)
+        for own in robot.joints:  # before the drives: Drake takes the last actuator's rotor inertia
+            self._add_own(own)
         for drive in robot.joints:
             made = plant.AddJointActuator(drive.name, self.joints[drive.name], drive.effort_limit)
             made.set_default_rotor_inertia(drive.armature)
             made.set_controller_gains(trees.PdControllerGains(p=drive.stiffness, d=drive.damping))
             self.drives[drive.name] = made
         self.couplings = [
-            plant.AddCouplerConstraint(self.joints[pair.leader], self.joints[pair.follower], 1.0)
-            for pair in robot.gripper.couplings
+            plant.AddCouplerConstraint(
+                self.joints[pair.follower], self.joints[pair.leader], pair.ratio, pair.offset
+            )
+            for pair in (*robot.gripper.couplings, *robot.couplings)
         ]
         for closure in reduced(prepared):
             first, second = self.links[closure.first], self.links[closure.second]
             plant.AddBallConstraint(first, closure.first_point, second, closure.second_point)
+
+    def _add_own(self, own: Joint) -> None:
+        """What a joint does by itself. Drake has no friction of it: a second actuator brakes."""
+        joint = self.joints[own.name]
+        joint.set_default_damping(own.passive_damping)
+        if own.spring:
+            hinge = isinstance(joint, trees.RevoluteJoint)
+            kind = trees.RevoluteSpring if hinge else trees.PrismaticSpring
+            spring = kind(joint, own.rest, own.spring)
+            self.springs[own.name] = self.plant.AddForceElement(spring)
+        if own.friction:
+            brake = self.plant.AddJointActuator(f"{own.name}/friction", joint, own.friction)
+            brake.set_controller_gains(trees.PdControllerGains(p=FREE, d=own.friction / CREEP))
+            self.brakes[own.name] = brake
 
     def _filter_collisions(self) -> None:
         manager = self.scene_graph.collision_filter_manager()
@@ -263,6 +289,10 @@ class World:
             manager.Apply(geometry.CollisionFilterDeclaration().ExcludeBetween(*pair))
         for group in apart:
             manager.Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(group))
+        for names in self.scene.apart:
+            shapes = [self.shapes.get(name.rpartition("/")[2], []) for name in names]
+            first, second = map(geometry.GeometrySet, shapes)
+            manager.Apply(geometry.CollisionFilterDeclaration().ExcludeBetween(first, second))
 
 
 def _solid(body: Body) -> tuple[Any, str, tuple[Any, ...]]:

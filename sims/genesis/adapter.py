@@ -36,6 +36,7 @@ from .engine import (
     centre_of_mass,
     contact_parameters,
     forget_worlds,
+    keep_apart,
     numbers,
     of_collider,
     start_engine,
@@ -67,7 +68,7 @@ class Genesis(Simulator):
         friction_rule="maximum",
         capabilities=Capability.named(
             "window offscreen save_restore exact_restore contact_count contact_forces compound "
-            "loops self_collide deterministic"
+            "loops couplings apart self_collide deterministic"
         ),
         deviations=(
             Deviation("link/*/damping", "Genesis has no damping of links"),
@@ -131,6 +132,7 @@ class Genesis(Simulator):
         world.build()
         self.solver = world.rigid_solver
         self._set_contacts(scene)
+        keep_apart(self.solver.collider, self._links(), scene.apart)
         self._free = [self._boxes[box.name].links[0].idx for box in scene.free_bodies]
         self._led = [self._boxes[box.name].links[0] for box in scene.prescribed_bodies]
         self._start_bodies(scene)
@@ -163,6 +165,14 @@ class Genesis(Simulator):
                 for geom in entity.geoms:
                     solver.set_geom_friction(friction, geom.idx)
 
+    def _links(self) -> dict[str, Any]:
+        """What the engine has for "ground", each `body/NAME` and `link/NAME`."""
+        links = {"ground": self._ground.links[0]}
+        links |= {f"body/{name}": body.links[0] for name, body in self._boxes.items()}
+        if self.prepared is not None:
+            links |= {f"link/{name}": self._robot.get_link(name) for name in self.prepared.links}
+        return links
+
     def _start_bodies(self, scene: Scene) -> None:
         """Velocities and damping of free bodies: linear in the world's axes, angular in the
         body's."""
@@ -187,9 +197,15 @@ class Genesis(Simulator):
         solver.set_dofs_armature(robot.column("armature"), dofs)
         solver.set_dofs_kp(self._stiffness, dofs)
         solver.set_dofs_kv(robot.column("damping"), dofs)
-        solver.set_dofs_damping(np.zeros(len(dofs)), dofs)
-        solver.set_dofs_frictionloss(np.zeros(len(dofs)), dofs)
-        solver.set_dofs_force_range(-limit, limit, dofs)
+        solver.set_dofs_damping(robot.column("passive_damping"), dofs)
+        solver.set_dofs_frictionloss(robot.column("friction"), dofs)
+        # The engine's springs are at rest at 0; a constant effort beyond the limits moves them.
+        spring = robot.column("spring")
+        moved = np.float32(spring * robot.column("rest"))
+        solver.set_dofs_force_range(moved - limit, moved + limit, dofs)
+        if spring.any():
+            solver.set_dofs_stiffness(spring, dofs)
+            solver.set_dofs_act_bias(moved, -self._stiffness, -robot.column("damping"), dofs)
         initial = robot.column("initial_position")
         solver.set_dofs_position(initial, dofs)
         self.command(initial, np.zeros(len(dofs)), np.zeros(len(dofs)))
@@ -270,11 +286,7 @@ class Genesis(Simulator):
         return int(array_of(of_collider(self.solver.collider, "collider_state").n_contacts)[0])
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        names = {self._ground.links[0].idx: "ground"}
-        names |= {box.links[0].idx: f"body/{name}" for name, box in self._boxes.items()}
-        if self.prepared is not None:
-            links = self.prepared.links
-            names |= {self._robot.get_link(name).idx: f"link/{name}" for name in links}
+        names = {link.idx: name for name, link in self._links().items()}
         found = self.solver.collider.get_contacts(as_tensor=True, to_torch=False)
         pairs = zip(found["link_a"], found["link_b"], strict=True)
         for (a, b), place, force in zip(pairs, found["position"], found["force"], strict=True):

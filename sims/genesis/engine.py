@@ -9,7 +9,7 @@ import dataclasses
 import gc
 import importlib
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -127,3 +127,11 @@ def contact_parameters(geom: Any) -> FloatArray:
 def of_collider(collider: Any, name: str) -> Any:
     """Its `collider_state` or `collider_info`: before 1.4 their names began with `_`."""
     return getattr(collider, name, None) or getattr(collider, f"_{name}")
+
+
+def keep_apart(collider: Any, links: Mapping[str, Any], pairs: Iterable[tuple[str, str]]) -> None:
+    """Take the shapes of pairs of links out of the collider's table."""
+    table = array_of(of_collider(collider, "collider_info").collision_pair_idx, copy=False)
+    for pair in pairs:
+        first, second = ([shape.idx for shape in links[name].geoms] for name in pair)
+        table[np.ix_(first, second)] = table[np.ix_(second, first)] = -1

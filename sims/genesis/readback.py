@@ -52,8 +52,15 @@ class ReadBack(readback.ReadBack):
             found |= {"damping": self._damping(part), "velocity": self._velocity(part)}
         return found
 
-    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
-        return all(map(self._coupled, pairs))
+    def coupling(self, pair: Coupling) -> FloatArray:
+        """Of a constraint between both joints, else not a number."""
+        joints = [self.robot.get_joint(name).idx for name in (pair.follower, pair.leader)]
+        for k, (*ends, kind) in enumerate(zip(*self._equalities(), strict=True)):
+            if kind == genesis.EQUALITY_TYPE.JOINT and ends == joints:
+                offset, ratio, *higher = self._array("equalities", "eq_data")[k, 0, :5]
+                if not any(higher):
+                    return np.array([ratio, offset])
+        return np.full(2, np.nan)
 
     def closures(self) -> list[FloatArray]:
         _, _, kinds = self._equalities()
@@ -146,13 +153,6 @@ class ReadBack(readback.ReadBack):
         first, second, kinds = (self._array("equalities", name)[:many, 0] for name in names)
         return first, second, kinds
 
-    def _coupled(self, pair: Coupling) -> bool:
-        joints = {self.robot.get_joint(name).idx for name in (pair.leader, pair.follower)}
-        return any(
-            {a, b} == joints and kind == genesis.EQUALITY_TYPE.JOINT
-            for a, b, kind in zip(*self._equalities(), strict=True)
-        )
-
     def collide(self, first: Any, second: Any) -> Any:
         first, second = self._shapes(first), self._shapes(second)
         either = self._pairs[np.ix_(first, second)], self._pairs[np.ix_(second, first)].T
@@ -166,12 +166,14 @@ class ReadBack(readback.ReadBack):
             for name in ("motion_ang", "motion_vel", "limit", "force_range", "act_gain", "act_bias",
                          "damping", "armature", "frictionloss", "stiffness")
         }  # fmt: skip
+        low, high = of["force_range"] - of["act_bias"][0]
+        same = np.isclose(high, -low, rtol=1e-6, atol=np.spacing(np.abs(of["force_range"]).max()))
         anchor = self._array("joints", "pos")[joint.idx]
         linear = of["motion_vel"] + np.cross(anchor, of["motion_ang"])
         return {
             "axis": np.concatenate([of["motion_ang"], linear]),
             "limits": of["limit"],
-            "effort_limit": one_value(of["force_range"] * [-1, 1]),
+            "effort_limit": high if same else np.array([low, high]),
             "stiffness": one_value([of["act_gain"], -of["act_bias"][1]]) + of["stiffness"],
             "damping": of["damping"] - of["act_bias"][2],
             "friction": of["frictionloss"],

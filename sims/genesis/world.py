@@ -32,6 +32,8 @@ def new_world(scene: Scene, settings: GenesisSettings, *, window: bool) -> Any:
         rigid_options=options.RigidOptions(
             # of a robot, but for links that a joint joins; boxes are entities of their own
             enable_self_collision="self_collide" in scene.words,
+            # also of links that overlap where all joints are at 0, as a Panda's fifth and seventh
+            enable_neutral_collision="self_collide" in scene.words,
             integrator=getattr(genesis.integrator, s.integrator),
             friction_cone=getattr(genesis.friction_cone, s.friction_cone),
             impratio=s.impratio or None,
@@ -116,10 +118,10 @@ def _described(body: Body, folder: Path) -> Any:
 
 
 def add_robot(world: Any, prepared: PreparedRobot) -> Any:
-    """The entity of the reduced robot. Equality constraints hold its fingers together, and close
-    its loops."""
+    """The entity of the reduced robot. Equality constraints couple its joints, and close its
+    loops."""
     morph = genesis.morphs.URDF(
-        file=prepared.to_urdf(mimic=True),  # becomes an equality constraint
+        file=prepared.to_urdf(),
         fixed=True,
         merge_fixed_links=False,
         decimate=False,  # else hulls of more than 500 faces are simplified, by up to 0.3 mm
@@ -127,16 +129,24 @@ def add_robot(world: Any, prepared: PreparedRobot) -> Any:
         requires_jac_and_IK=False,
     )
     robot = world.add_entity(morph, material=material(prepared.robot.friction))
-    for number, closure in enumerate(reduced(prepared)):
-        # Genesis has no public call for it: this is what it calls for those of an MJCF file.
-        robot._add_equality(
-            name=f"closure {number}",
-            type=genesis.EQUALITY_TYPE.CONNECT,
-            objs_name=(closure.first, closure.second),
-            data=np.array([*closure.first_point, *closure.second_point, *[0.0] * 5]),
-            sol_params=genesis.utils.geom.default_solver_params(),
-        )
+    for pair in (*prepared.robot.gripper.couplings, *prepared.robot.couplings):
+        _hold(robot, "JOINT", pair.follower, pair.leader, [pair.offset, pair.ratio])
+    for closure in reduced(prepared):
+        points = [*closure.first_point, *closure.second_point]
+        _hold(robot, "CONNECT", closure.first, closure.second, points)
     return robot
+
+
+def _hold(robot: Any, kind: str, first: str, second: str, numbers: list[float]) -> None:
+    """An equality constraint between two joints or links. Genesis has no public call for it: this
+    is what it calls for those of a file."""
+    robot._add_equality(
+        name=f"hold {robot.n_equalities}",
+        type=getattr(genesis.EQUALITY_TYPE, kind),
+        objs_name=(first, second),
+        data=np.array([*numbers, *[0.0] * (11 - len(numbers))]),
+        sol_params=genesis.utils.geom.default_solver_params(),
+    )
 
 
 def add_camera(world: Any, width: int, height: int) -> Any:

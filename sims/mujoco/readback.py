@@ -97,9 +97,6 @@ class ReadBack(readback.ReadBack):
     def closures(self) -> list[FloatArray]:
         return closed(self.model, self.active)
 
-    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
-        return all(np.array_equal(self.coupling(pair), [1.0, 0.0]) for pair in pairs)
-
     def coupling(self, pair: Coupling) -> FloatArray:
         """Of an active constraint between both joints, else not a number."""
         model, joints = self.model, [self.at.joints[n] for n in (pair.follower, pair.leader)]

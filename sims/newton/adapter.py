@@ -61,7 +61,7 @@ class Newton(Simulator):
         friction_rule="maximum",
         capabilities=Capability.named(
             "window offscreen save_restore exact_restore contact_count contact_forces compound "
-            "joint_wrenches loops self_collide deterministic"
+            "joint_wrenches loops couplings apart self_collide deterministic"
         ),
         deviations=(
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),

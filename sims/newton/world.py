@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -37,6 +39,9 @@ def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSe
     builder.add_ground_plane(cfg=_surface(scene.ground_friction, settings), label="ground")
     for body in scene.bodies:
         _add_body(builder, body, _surface(body.friction, settings), heavy(scene))
+    for first, second in scene.apart:
+        for pair in product(_shapes(builder, scene, first), _shapes(builder, scene, second)):
+            builder.add_shape_collision_filter_pair(*pair)
     model = builder.finalize(device="cpu")
     # What MuJoCo needs of a contact beyond Newton's own parameters.
     model.mujoco.condim.fill_(settings.condim)
@@ -64,8 +69,9 @@ def make_solver(model: Any, prepared: PreparedRobot | None, settings: NewtonSett
     options.timestep = settings.timestep
     # On a state that is not finite MuJoCo would start over from its initial state, silently.
     options.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    # The fingers' coupling and the loops, as stiff as the step allows.
-    solver.mj_model.eq_solref[:] = (2 * settings.timestep, 1.0)
+    # Couplings, loops and the friction of joints, as stiff as the step allows.
+    stiffest = 2 * settings.timestep, 1.0
+    solver.mj_model.eq_solref[:] = solver.mj_model.dof_solref[:] = stiffest
     if prepared is not None:
         _set_second_points(solver.mj_model, prepared)
     return solver
@@ -103,8 +109,6 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
     joints = names(builder.joint_label)
     for joint in robot.joints:
         _set_drive(builder, joints.index(joint.name), joint)
-    for pair in robot.gripper.couplings:
-        builder.set_joint_mimic(joints.index(pair.follower), joints.index(pair.leader))
     links = names(builder.body_label)
     for closure in reduced(prepared):
         newton.solvers.mujoco.add_equality_connect(
@@ -113,6 +117,24 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
             links.index(closure.second),
             anchor=wp.vec3(*closure.first_point),
         )
+    for pair in (*robot.gripper.couplings, *robot.couplings):
+        newton.solvers.mujoco.add_equality_joint(
+            builder,
+            joints.index(pair.follower),
+            joints.index(pair.leader),
+            polycoef=(pair.offset, pair.ratio),
+        )
+
+
+def _shapes(builder: Any, scene: Scene, name: str) -> Iterable[int]:
+    """Newton's numbers of the shapes of "ground", `body/NAME` or `link/NAME`."""
+    kind, _, rest = name.partition("/")
+    if kind == "link":
+        shapes: list[int] = builder.body_shapes[names(builder.body_label).index(rest)]
+        return shapes
+    body = scene.body(rest) if rest else None
+    labels = [shape_label(body, k) for k in range(len(body.parts))] if body else [name]
+    return map(builder.shape_label.index, labels)
 
 
 def _add_body(builder: Any, part: Body, surface: Any, most: float) -> None:
@@ -165,7 +187,10 @@ def _set_drive(builder: Any, number: int, joint: Joint) -> None:
     dof = builder.joint_qd_start[number]
     builder.joint_target_mode[dof] = newton.JointTargetMode.NONE
     builder.joint_armature[dof] = joint.armature
-    builder.joint_q[builder.joint_q_start[number]] = joint.initial_position
+    builder.joint_damping[dof], builder.joint_friction[dof] = joint.passive_damping, joint.friction
+    coordinate = builder.joint_q_start[number]
+    builder.joint_stiffness[dof], builder.joint_rest_q[coordinate] = joint.spring, joint.rest
+    builder.joint_q[coordinate] = joint.initial_position
     drives = newton.solvers.mujoco
     drives.add_actuator_position(
         builder,

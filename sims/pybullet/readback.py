@@ -141,9 +141,6 @@ class ReadBack(readback.ReadBack):
             [turn @ np.array(angular)[:, column], turn @ np.array(linear)[:, column]]
         )
 
-    def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
-        return all(np.array_equal(self.coupling(pair), [1.0, 0.0]) for pair in pairs)
-
     def coupling(self, pair: Coupling) -> FloatArray:
         """Of a gear of both joints, else not a number."""
         joints = dict(zip(self.prepared.robot.joint_names, self.joints, strict=True))

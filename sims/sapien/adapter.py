@@ -3,8 +3,8 @@
 Drives are PhysX's own implicit springs in the joints of a reduced-coordinate articulation, force
 limited. A joint force set beside the drive would not count towards that limit, so the effort
 feed-forward rides on the position target: q* + tau_ff / k; the limit then clips the whole sum.
-Velocity targets are native. The fingers are held together by SAPIEN's mimic tendon, with the
-stiffness that its URDF loader gives a mimic joint. See docs/engines/sapien.md.
+Velocity targets are native. Joints are coupled by SAPIEN's tendons, with the stiffness that its
+URDF loader gives a mimic joint. See docs/engines/sapien.md.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
-from .bodies import ROBOT, WORLD, add_body, add_ground
+from .bodies import ROBOT, WORLD, Groups, add_body, add_ground, groups_apart
 from .drawing import Drawing
+from .joints import add_own, couple
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, SAPIENSettings
 
@@ -57,11 +58,11 @@ class SAPIEN(Simulator):
         companions={"3.0.0": ("numpy", "setuptools<81")},  # pkg_resources
         friction_rule="mean",
         capabilities=Capability.named(
-            "window offscreen save_restore contact_count contact_forces compound loops "
-            "self_collide joint_wrenches deterministic"
+            "window offscreen save_restore contact_count contact_forces compound loops couplings "
+            "apart self_collide joint_wrenches deterministic"
         ),
         deviations=(
-            Deviation("gripper/coupled", "SAPIEN does not report its tendons"),
+            Deviation("gripper/coupled coupling/*", "SAPIEN does not report its tendons"),
             Deviation(
                 "link/*/meshes",
                 "PhysX's convex hull of a mesh leaves out corners",
@@ -96,19 +97,21 @@ class SAPIEN(Simulator):
         self._system = physx.PhysxCpuSystem()
         self._system.timestep = self.settings.timestep
         self._world = sapien.Scene([self._system])
-        self._ground = add_ground(self._world, scene.ground_friction, scene.ground_restitution)
-        damping = self.settings.angular_damping
-        self._bodies = {box.name: add_body(self._world, box, damping) for box in scene.bodies}
+        groups = groups_apart(scene)
+        self._ground = add_ground(self._world, scene, groups)
+        damped = self.settings.angular_damping
+        self._bodies = {b.name: add_body(self._world, b, damped, groups) for b in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         packed = self._system.rigid_dynamic_components
         self._rows = [packed.index(body) for body in self._free]
         self._robot: Any = None
         self._joints: list[Any] = []
+        self._own: list[list[Any]] = []
         self._links: dict[str, Any] = {}
         self._closures: list[Any] = []
         if self.prepared is not None:
-            self._load_robot(self.prepared)
+            self._load_robot(self.prepared, groups)
 
     def _configure(self, scene: Scene) -> None:
         """Set what PhysX reads when a scene, a shape and a body are made: global, so all of it."""
@@ -126,8 +129,8 @@ class SAPIEN(Simulator):
         physx.set_body_config(s.position_iterations, s.velocity_iterations, s.sleep_threshold)
         physx.set_shape_config(s.contact_offset, 0.0)
 
-    def _load_robot(self, prepared: PreparedRobot) -> None:
-        robot = prepared.robot
+    def _load_robot(self, prepared: PreparedRobot, groups: Groups) -> None:
+        robot, step = prepared.robot, self.settings.timestep
         loader = self._world.create_urdf_loader()
         loader.set_material(robot.friction, robot.friction, 0.0)
         with tempfile.TemporaryDirectory() as folder:
@@ -136,7 +139,7 @@ class SAPIEN(Simulator):
             builder = loader.load_file_as_articulation_builder(str(path))
         touches = WORLD | ROBOT if robot.self_collide else WORLD  # never two that a joint joins
         for link in builder.link_builders:
-            link.collision_groups = [ROBOT, touches, 0, 0]
+            link.collision_groups = groups.get(f"link/{link.name}", [ROBOT, touches, 0, 0])
         self._robot = builder.build(fix_root_link=True)
         self._links = {link.name: link for link in self._robot.links}
         for link in self._robot.links:
@@ -154,9 +157,10 @@ class SAPIEN(Simulator):
         for joint, drive in zip(self._joints, robot.joints, strict=True):
             joint.set_drive_properties(drive.stiffness, drive.damping, drive.effort_limit, "force")
             joint.set_armature([drive.armature])
-            joint.set_friction(self.settings.joint_friction)
-        for pair in robot.gripper.couplings:
-            self._couple_fingers(pair.leader, pair.follower)
+            joint.set_friction(0.0 if drive.friction else self.settings.joint_friction)
+            self._own.append(add_own(joint, drive, step))
+        for pair in (*robot.gripper.couplings, *robot.couplings):
+            couple(self._robot, pair, self.settings.coupling_stiffness)
         self._closures = [self._close(closure) for closure in reduced(prepared)]
         initial = np.empty(len(order))
         initial[self._order] = robot.column("initial_position")
@@ -167,16 +171,6 @@ class SAPIEN(Simulator):
         self._speeds = [joint.set_drive_velocity_target for joint in self._joints]
         zero = np.zeros(len(order))
         self.command(robot.column("initial_position"), zero, zero)
-
-    def _couple_fingers(self, first: str, second: str) -> None:
-        """Hold two fingers at equal positions, as SAPIEN's loader does for a mimic joint."""
-        fingers = [self._robot.find_joint_by_name(name).child_link for name in (first, second)]
-        self._robot.create_fixed_tendon(
-            [fingers[0].parent, *fingers],
-            [0, -1, 1],
-            [0, -1, 1],
-            stiffness=self.settings.coupling_stiffness,
-        )
 
     def _close(self, closure: Closure) -> Any:
         """Hold two links together by a joint that lets them turn alone."""

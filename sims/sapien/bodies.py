@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Sphere
-from pytest_simbench.simulator import lazy_import
+from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Scene, Sphere
+from pytest_simbench.simulator import NotSupportedError, lazy_import
 
 from .drawing import UPRIGHT, facing_up, to_sapien
 
@@ -17,24 +18,56 @@ physx = lazy_import("sapien.physx")
 ROBOT, WORLD = 1, 2
 """Collision groups: the robot's links touch everything but each other."""
 
+CLASSES = 30
+"""Of what is kept apart: SAPIEN has 32 bits of groups."""
 
-def add_ground(world: Any, friction: float, restitution: float) -> Any:
+Groups = dict[str, list[int]]
+"""SAPIEN's four words of groups by "ground", `body/NAME` and `link/NAME`."""
+
+
+def groups_apart(scene: Scene) -> Groups:
+    """Groups of what the scene keeps apart: bodies, or links, with the same partners are a class.
+
+    Raises:
+        NotSupportedError: there are more classes than bits.
+    """
+    partners: dict[str, set[str]] = defaultdict(set)
+    for first, second in scene.apart:
+        partners[first].add(second)
+        partners[second].add(first)
+    classes = {name: (name[:5] == "link/", frozenset(of)) for name, of in partners.items()}
+    bits = {made: 4 << k for k, made in enumerate(dict.fromkeys(classes.values()))}
+    if len(bits) > CLASSES:
+        raise NotSupportedError(f"sapien keeps {CLASSES} kinds of parts apart, not {len(bits)}")
+    through = scene.robot is not None and not scene.robot.self_collide
+    found = {}
+    for name, (link, others) in classes.items():
+        mask = WORLD if link and through else WORLD | ROBOT
+        for other, made in classes.items():
+            if other not in others and not (link and made[0] and through):
+                mask |= bits[made]
+        found[name] = [bits[classes[name]], mask, 0, 0]
+    return found
+
+
+def add_ground(world: Any, scene: Scene, groups: Groups) -> Any:
     """The component of the plane z = 0, made in the world."""
     builder = world.create_actor_builder()
-    material = physx.PhysxMaterial(friction, friction, restitution)
+    friction = scene.ground_friction
+    material = physx.PhysxMaterial(friction, friction, scene.ground_restitution)
     builder.add_plane_collision(facing_up(), material)
-    builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
+    builder.collision_groups = groups.get("ground", [WORLD, WORLD | ROBOT, 0, 0])
     entity = builder.build_static("ground")
     return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
 
 
-def add_body(world: Any, box: Body, angular_damping: float) -> Any:
+def add_body(world: Any, box: Body, angular_damping: float, groups: Groups) -> Any:
     """The component of a body, made in the world; `angular_damping` [1/s] where it has none."""
     builder = world.create_actor_builder()
     material = physx.PhysxMaterial(box.friction, box.friction, box.restitution)
     for part in box.parts:
         _add_shape(builder, part, material)
-    builder.collision_groups = [WORLD, WORLD | ROBOT, 0, 0]
+    builder.collision_groups = groups.get(f"body/{box.name}", [WORLD, WORLD | ROBOT, 0, 0])
     builder.initial_pose = sapien.Pose(box.pose.position, box.pose.quaternion)
     if box.fixed:
         entity = builder.build_static(box.name)

@@ -21,6 +21,7 @@ from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
 from .drawing import UPRIGHT
+from .joints import own_of
 
 physx = lazy_import("sapien.physx")
 
@@ -35,7 +36,8 @@ class ReadBack(readback.ReadBack):
         super().__init__(simulator, simulator._ground, simulator._bodies, simulator._links)
         self.system, self.made = simulator._system, simulator._closures
         names = () if self.prepared is None else self.prepared.robot.joint_names
-        states = zip(simulator._joints, simulator.joint_state()[0], strict=True)
+        positions = simulator.joint_state()[0]
+        states = zip(simulator._joints, simulator._own, positions, strict=True)
         self.joints = dict(zip(names, states, strict=True))
 
     def world(self) -> dict[str, Any]:
@@ -94,7 +96,8 @@ class ReadBack(readback.ReadBack):
         return {"dynamic": free, "velocity": velocity, **self.inertial(part)}
 
     def joint(self, name: str) -> dict[str, Any]:
-        joint, position = self.joints[name]
+        joint, own, position = self.joints[name]
+        stiffness, damping, friction = own_of(joint, own, self.system.timestep)
         frame = _pose(joint.pose_in_child)  # which turns about, or moves along, its x axis
         axis, still = frame.rotation()[:, 0], np.zeros(3)
         turning = [axis, np.cross(frame.position, axis)]
@@ -102,9 +105,9 @@ class ReadBack(readback.ReadBack):
             "axis": np.concatenate([still, axis] if "prism" in joint.type else turning),
             "limits": joint.limits[0],
             "effort_limit": joint.force_limit,
-            "stiffness": joint.stiffness,
-            "damping": joint.damping,
-            "friction": joint.friction,
+            "stiffness": joint.stiffness + stiffness,
+            "damping": joint.damping + damping,
+            "friction": joint.friction + friction,
             "armature": joint.armature[0],
             "initial_position": position,
         }

@@ -28,8 +28,8 @@ class SAPIENSettings(Settings):
         sleep_threshold: kinetic energy per mass below which bodies fall asleep [m^2/s^2].
         angular_damping: of free bodies [1/s].
         link_damping: of the robot's links, linear and angular [1/s].
-        joint_friction: coefficient of the joints' friction.
-        coupling_stiffness: of the tendon between the fingers [N/m].
+        joint_friction: coefficient of the friction of joints without their own.
+        coupling_stiffness: of the tendons that couple joints [N m/rad, N/m].
     """
 
     timestep: float = 0.01

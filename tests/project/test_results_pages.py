@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.plugin.options import MOST_REPETITIONS
-from pytest_simbench.records.choices import FIRST_SEED
+from pytest_simbench.records.tuned_on import FIRST_SEED
 from tests.records.build import record
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.records.choices import Seen
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.readings import Reading
 from pytest_simbench.records.record import Record
+from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.records.upgrade import taken_apart
 
 from .build import record

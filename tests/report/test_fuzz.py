@@ -29,7 +29,6 @@ from pytest_simbench.recordings.album import Album
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.records import repeatability
 from pytest_simbench.records.baseline import KEY, BaselineError, read_baseline, to_extra_info
-from pytest_simbench.records.choices import Seen
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import TaskDescription, Threshold
 from pytest_simbench.records.folder import (
@@ -42,6 +41,7 @@ from pytest_simbench.records.folder import (
 )
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, RecordError
+from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.repeatability.agreement import FOLDER as SAMPLES
 from pytest_simbench.report.figures.sheet import albums
 from pytest_simbench.report.files import write_files, write_tables

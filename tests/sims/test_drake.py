@@ -1,5 +1,5 @@
 """What only Drake's adapter has to show: corner spheres, which stay within their box and reach its
-faces, and its window in a browser."""
+faces, the brakes of joints with friction, and its window in a browser."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from hypothesis import strategies as st
 from pytest_simbench.sims.drake.adapter import Drake
 from pytest_simbench.sims.drake.world import corner_centres, fitting_radius, pad_centres
 
+from pytest_simbench.laws.mechanisms import mechanism
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.scene import STANDARD_GRAVITY, Box, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.tasks import Jitter, Stacking
+from pytest_simbench.testing import joints, scenes
 
 SCENE = Stacking().scene(1, Jitter())
 
@@ -45,6 +47,19 @@ def test_tuned_cube_rests_on_its_four_lower_corners() -> None:
     assert sorted(near) == [0, 1, 2, 3]
     weight = sum(abs(info.contact_force()[2]) for info in infos)
     assert weight == pytest.approx(0.1 * 9.80665, rel=1e-3)
+
+
+def test_a_joint_with_friction_keeps_its_rotor_inertia() -> None:
+    """Its brake is an actuator too, and of several Drake takes the rotor inertia of the last."""
+    robot = mechanism("braked", joints.slider("braked", friction=4.0))
+    simulator = Drake(Drake.profiles["tuned"])
+    simulator.load(Scene("braked", robot=scenes.with_joint(robot, "braked", armature=1.0)))
+    for _ in range(100):
+        simulator.step()
+    falls = simulator.joint_state()[1, 0] / simulator.time
+    simulator.close()
+    expected = (joints.MASS * STANDARD_GRAVITY[2] + 4.0) / (joints.MASS + 1.0)
+    assert falls == pytest.approx(expected, rel=1e-3)
 
 
 def test_window_is_a_page_that_goes_with_its_world() -> None:

@@ -1,6 +1,6 @@
 """What only SAPIEN's adapter has to show: its settings reach PhysX, `default` is what PhysX and
-SAPIEN do by themselves, the tendon between the fingers takes nothing of the squeeze, and what a
-restored world keeps."""
+SAPIEN do by themselves, the tendon between the fingers takes nothing of the squeeze, groups keep
+apart what the scene does, and what a restored world keeps."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pytest_simbench.sims.sapien.adapter import SAPIEN
+from pytest_simbench.sims.sapien.bodies import ROBOT, WORLD, groups_apart
+from pytest_simbench.sims.sapien.readback import _compatible
 
-from pytest_simbench.scene import FloatArray, Scene
-from pytest_simbench.simulator import PreparedRobot
+from pytest_simbench.laws.mechanisms import Part, Y, mechanism
+from pytest_simbench.scene import Coupling, FloatArray, Scene
+from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 from pytest_simbench.tasks import Jitter, Stacking
-from pytest_simbench.testing import scenes
+from pytest_simbench.testing import joints, scenes
 
 from .settings_told import told_sapien
 
@@ -94,6 +98,55 @@ def test_the_tendon_takes_nothing_of_the_squeeze() -> None:
     assert set(forces) == {"panda_leftfinger", "panda_rightfinger"}
     for force in forces.values():
         assert np.linalg.norm(force) == pytest.approx(robot.gripper.squeeze, rel=0.01)
+
+
+@pytest.mark.parametrize("ratio", [-3.0, 2.0, 0.2])
+def test_couplings_hold_at_any_ratio(ratio: float) -> None:
+    """With coefficients above 1 they stuck, 0.2 rad apart."""
+    pair = Coupling("turned", "falling", ratio, 0.1)
+    levers = joints.lever("falling"), joints.lever("turned", (0.0, 0.5, 0.0), start=0.1)
+    with world(Scene("coupled", robot=mechanism("coupled", *levers, couplings=(pair,)))) as made:
+        for _ in range(100):
+            made.step()
+        leads, follows = made.joint_state()[0]
+    assert follows == pytest.approx(ratio * leads + 0.1, abs=1e-3)
+    assert abs(leads) > 0.2
+
+
+def test_joints_of_two_links_are_not_coupled() -> None:
+    second = Part("second", Y, (0.3, 0.0, 0.0))
+    pair = Coupling("second", "first")
+    robot = mechanism("chain", joints.lever("first"), second, couplings=(pair,))
+    with (
+        pytest.raises(NotSupportedError, match="'first' is on 'base', 'second' on 'first link'"),
+        world(Scene("chain", robot=robot)),
+    ):
+        pass
+
+
+PARTS = ("ground", *(f"{kind}/{n}" for kind in ("body", "link") for n in range(4)))
+
+
+@given(
+    st.sets(st.tuples(*[st.sampled_from(PARTS)] * 2).filter(lambda pair: pair[0] < pair[1])),
+    st.booleans(),
+)
+def test_groups_keep_apart_what_the_scene_does(pairs: set[Any], self_collide: bool) -> None:
+    robot = replace(scenes.arm(), self_collide=self_collide)
+    scene: Any = SimpleNamespace(apart=pairs, robot=robot)
+    found = groups_apart(scene)
+    for a in PARTS:
+        for b in PARTS:
+            links = [name.startswith("link/") for name in (a, b)]
+            plain = [
+                [ROBOT, WORLD | (ROBOT if self_collide else 0), 0, 0]
+                if link
+                else [WORLD, WORLD | ROBOT, 0, 0]
+                for link in links
+            ]
+            groups = [found.get(name, default) for name, default in zip((a, b), plain, strict=True)]
+            meet = (a, b) not in pairs and (b, a) not in pairs and (self_collide or not all(links))
+            assert a == b or _compatible(*groups) == meet, (a, b)
 
 
 def future(simulator: SAPIEN, steps: int) -> FloatArray:

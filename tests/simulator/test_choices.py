@@ -10,9 +10,9 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.plugin.options import MOST_REPETITIONS, option
-from pytest_simbench.records.choices import FIRST_SEED, Seen, published_again
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
+from pytest_simbench.records.tuned_on import FIRST_SEED, Seen, published_again
 from pytest_simbench.report.markdown.run import render_task as written
 from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.terminal.run import render_task

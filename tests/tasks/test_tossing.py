@@ -14,8 +14,8 @@ from pytest_simbench.data.tosses import EDGE, RATE
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.records.choices import Seen
 from pytest_simbench.records.record import Record
+from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray
 from pytest_simbench.tasks import Jitter, Tossing
 from pytest_simbench.tasks.tossing import off

@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 
 from pytest_simbench.measure.differences import Difference, differences
 from pytest_simbench.measure.modes import compare_modes
-from pytest_simbench.records.choices import published_again
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.series import comparable, grouped, series
+from pytest_simbench.records.tuned_on import published_again
 from pytest_simbench.report.model.document import Of, names
 from pytest_simbench.report.model.pooling import (
     COST,
