@@ -81,9 +81,13 @@ def drive_of(reading: Reading, joint: int) -> Drive:
     if stiffness < 0 or damping < 0 or (stiffness and not np.any(gains * gears)):
         plain = plain[:0]  # what drives a joint away from where it is, or cannot be commanded
         gears, gains, constants, stiffness, damping = plain, plain, plain, 0.0, 0.0
-    limited = model.actuator_forcelimited[plain].astype(bool)
-    ranges = np.abs(model.actuator_forcerange[plain]).min(axis=1) * np.abs(gears)
-    limit = float(ranges.sum()) if len(plain) and limited.all() else STRONG
+    limits = np.abs(model.actuator_forcerange[plain]).min(axis=1) * np.abs(gears)
+    limits = np.where(model.actuator_forcelimited[plain], limits, STRONG)
+    if not stiffness and not damping:  # controls of motors are efforts, and have limits too
+        most = np.abs(gains) * np.abs(model.actuator_ctrlrange[plain]).max(axis=1)
+        most = (most + np.abs(constants)) * np.abs(gears)
+        limits = np.where(model.actuator_ctrllimited[plain], np.minimum(limits, most), limits)
+    limit = float(limits.sum()) if len(plain) else STRONG
     zero = float(model.qpos0[model.jnt_qposadr[joint]])
     made = Drive(plain, gears, gains, constants, zero, stiffness, damping, min(limit, STRONG))
     names = [reading.name("actuator", int(k)) for k in plain]
@@ -94,11 +98,11 @@ def drive_of(reading: Reading, joint: int) -> Drive:
         reason = f"it holds its joint at rest, by at most {made.limit:g} N m or N"
         reading.tell("actuator (velocity)", APPROXIMATED, reason, names)
     elif names:
-        reason = "a drive that is told an effort; without a command it does nothing, here and in "
         pull = made.effort(np.zeros(model.nu))
-        state = APPROXIMATED if pull else CARRIED
-        reason += f"the file it pulls with {pull:g} N m or N" if pull else "the file"
-        reading.tell("actuator (motor)", state, reason, names)
+        reason = f"a drive that is told an effort of at most {made.limit:g} N m or N; without a "
+        reason += "command it does nothing"
+        reason += f" here, and pulls {pull:g} in the file" if pull else ", here and in the file"
+        reading.tell("actuator (motor)", APPROXIMATED if pull else CARRIED, reason, names)
     return made
 
 
