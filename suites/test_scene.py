@@ -24,7 +24,7 @@ def sim_settings(request, sim_case, scene_file):
     """The time step of the test: the profile's own (in `file` the file's), or a part of it."""
     own = settings_of(sim_case.simulator, sim_case.profile, {}).timestep
     if sim_case.profile == "file":
-        own = min(scene_file().file_timestep, LARGEST_TIMESTEP)
+        own = min(scene_file().file_timestep or own, LARGEST_TIMESTEP)
     return {"timestep": own / request.node.callspec.params.get("finer", 1)}
 
 

@@ -79,7 +79,7 @@ def _reduced(prepared: PreparedRobot, closure: Closure) -> Closure:
             f"a closure of {robot.name} holds {closure.first!r} at {closure.second!r}, and no "
             "joint between them moves"
         )
-    found = Closure(names[0], names[1], points[0], points[1])
+    found = Closure(names[0], names[1], points[0], points[1], closure.rigid)
     first, second = ends(prepared, found)
     if (apart := float(np.linalg.norm(first - second))) > OPEN:
         raise DescriptionError(
@@ -108,6 +108,15 @@ def ends(
         for link, point in closure.sides
     )
     return first, second
+
+
+def frames(prepared: PreparedRobot, closure: Closure) -> tuple[Pose, Pose]:
+    """A frame in each link of a reduced closure, at its points: they are one frame of the world
+    where the joints start, and stay one where the closure is rigid."""
+    robot = prepared.robot
+    poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
+    turn = (poses[closure.second].inverse() * poses[closure.first]).quaternion
+    return Pose(closure.first_point), Pose(closure.second_point, turn)
 
 
 def joined(prepared: PreparedRobot) -> frozenset[frozenset[str]]:

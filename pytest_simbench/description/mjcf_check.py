@@ -73,7 +73,9 @@ def _included(
     own: dict[ET.Element, int] = {}
     xml = read_xml(str(path), "the scene", own)
     if xml.tag == "robot":
-        raise DescriptionError(f"{path} is a URDF, no MJCF; robots are given as --robot")
+        raise DescriptionError(
+            f"{path} is a URDF, no MJCF; call it .urdf, or give a robot as --robot"
+        )
     lines.update({element: (path, line) for element, line in own.items()})
     found: list[ET.Element] = []
     for element in xml.iter():

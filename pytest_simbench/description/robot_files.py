@@ -106,6 +106,11 @@ def keep(urdf: str, meshes: Mapping[str, bytes], ending: str = ".urdf") -> Path:
     return _write(folder() / f"{digest(text)}{ending}", text)
 
 
+def keep_mesh(data: bytes) -> Path:
+    """Write a mesh (.stl) into that folder, unless it is there; where it is."""
+    return _write(folder() / f"{digest(data)}.stl", data)
+
+
 def digest(data: bytes) -> str:
     """Of a file, 24 digits."""
     return hashlib.sha256(data).hexdigest()[:24]

@@ -13,10 +13,14 @@ from pytest_simbench.client.launch import Launch
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.description.carried import Carried
 from pytest_simbench.description.mjcf_check import check_mjcf
+from pytest_simbench.description.urdf_scene import read_urdf_scene
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import Scene, Start
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.registry import adapter, address, registered
+
+URDF = ".urdf"
+"""Ending of scenes that need no engine to be read."""
 
 NOT_YET = (".sdf", ".world", ".usd", ".usda", ".usdc", ".usdz")
 """Endings of scenes that nobody here reads yet."""
@@ -38,7 +42,7 @@ class SceneFile:
 
 
 def read_scene_file(path: str | Path) -> SceneFile:
-    """Read a file by the first engine here that reads such files.
+    """Read a file by the first engine here that reads such files; a URDF without any.
 
     What was read is kept, until the file changes. (Files that it includes and meshes are not
     looked at for that.)
@@ -48,6 +52,8 @@ def read_scene_file(path: str | Path) -> SceneFile:
             it; one sentence with the file, and its line where that is known.
     """
     whole = Path(path).absolute()
+    if whole.suffix.lower() == URDF:
+        return SceneFile(whole, *read_urdf_scene(whole))
     name = _reader(whole).name
     check_mjcf(str(whole))
     status = whole.stat()
@@ -66,7 +72,7 @@ def _reader(path: Path) -> SimulatorInfo:
         raise DescriptionError(
             f"{path} is read by {reading[0].title}, which is not here: {reading[0].install}"
         )
-    known = ", ".join(sorted({ending for info in infos for ending in info.reads}))
+    known = ", ".join(sorted({URDF, *(ending for info in infos for ending in info.reads)}))
     if ending in NOT_YET:
         raise DescriptionError(
             f"{path}: {ending} files are not read yet; convert it to MJCF ({known})"

@@ -205,15 +205,15 @@ def data_set(request: pytest.FixtureRequest) -> Callable[[str], Any]:
 
 
 @pytest.fixture
-def scene_file(request: pytest.FixtureRequest, output_path: Path) -> Callable[..., Scene]:
+def scene_file(request: pytest.FixtureRequest, output_path: Path) -> inputs.SceneFiles:
     """A scene of a file: `scene_file("kitchen.xml", starts="starts.npz")`, or
-    `starts="keyframes"` for those in the file itself.
+    `starts="keyframes"` for those in the file itself. A log that it follows:
+    `scene_file.log("run.npz", scene)`.
 
     Paths are relative to the test's file; without any it is the file of `--sim-scene`. What of the
     file was carried, and what not, is written into the run folder.
     """
-    tell = session_of(request.config).run.tell
-    return partial(inputs.load_scene, request, output_path, tell)
+    return inputs.SceneFiles(request, output_path, session_of(request.config).run.tell)
 
 
 @pytest.fixture(scope="session")

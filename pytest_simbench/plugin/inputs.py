@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,7 @@ from pytest_simbench.plugin.arguments import failing
 
 if TYPE_CHECKING:
     from pytest_simbench.scene import Scene, Start
+    from pytest_simbench.tasks import Log
 
 ACCOUNT = "carried.md"
 """Of the run folder: what of the scenes' files was carried."""
@@ -71,55 +73,76 @@ def read_or_skip(config: pytest.Config, name: str) -> Any:
         return read(name, _data_folder(config))
 
 
-def load_scene(
-    request: pytest.FixtureRequest,
-    folder: Path,
-    tell: Callable[[str], None],
-    path: str | Path | None = None,
-    starts: str | Path | None = None,
-) -> Scene:
-    """The scene of a file, and its account in the run folder; what is wrong ends the run.
+@dataclass(frozen=True)
+class SceneFiles:
+    """The fixture `scene_file`; what is wrong with a file ends the run.
 
-    Without a file the test is skipped: the suite of scenes stands among others.
-
-    Args:
+    Attributes:
         request: of the test, whose folder paths are relative to.
         folder: of the run.
         tell: prints what a user should know, at the end of the run.
-        path: of the scene; None for that of `--sim-scene`.
-        starts: of a file of starts (.npz), see `description.starts`, or `KEYFRAMES`; None: the
-            scene starts as it is written.
     """
-    from pytest_simbench.description.carried import markdown, terminal_lines
-    from pytest_simbench.description.starts import distinct, read_starts
-    from pytest_simbench.experiment.scene_file import read_scene_file
-    from pytest_simbench.records.paths import write_whole
+
+    request: pytest.FixtureRequest
+    folder: Path
+    tell: Callable[[str], None]
+
+    def log(self, path: str | Path, scene: Scene) -> Log:
+        """The log of a file that drives of a scene follow, see `recordings.logs`."""
+        from pytest_simbench.recordings.logs import read_log
+
+        with _ending():
+            return read_log(self.request.path.parent / path, scene)
+
+    def __call__(self, path: str | Path | None = None, starts: str | Path | None = None) -> Scene:
+        """The scene of a file, and its account in the run folder.
+
+        Without a file the test is skipped: the suite of scenes stands among others.
+
+        Args:
+            path: of the scene; None for that of `--sim-scene`.
+            starts: of a file of starts (.npz), see `description.starts`, or `KEYFRAMES`; None: the
+                scene starts as it is written.
+        """
+        from pytest_simbench.description.carried import markdown, terminal_lines
+        from pytest_simbench.description.starts import distinct, read_starts
+        from pytest_simbench.experiment.scene_file import read_scene_file
+        from pytest_simbench.records.paths import write_whole
+        from pytest_simbench.scene import SceneError
+
+        given = options.value(self.request.config, "sim_scene")
+        if path is None and not given:
+            pytest.skip("this test takes the scene of --sim-scene FILE, and none was named")
+        at = Path(given) if path is None else self.request.path.parent / path
+        with _ending():
+            found = read_scene_file(at)
+            scene = found.scene
+            rows: tuple[Start, ...] = ()
+            if starts == KEYFRAMES:
+                rows = scene.starts
+                if not rows:
+                    raise SceneError(f"{at} has no keyframes; name a file of starts, or none")
+            elif starts is not None:
+                rows = read_starts(self.request.path.parent / starts, scene)
+            scene = replace(scene, starts=rows)
+            if (different := distinct(rows)) < len(rows):
+                self.tell(
+                    f"{starts}: {len(rows)} starts, and {different} different in how the bodies "
+                    f"lie to each other: as evidence they count as {different}"
+                )
+        write_whole(self.folder, ACCOUNT, markdown(at.name, found.account).encode())
+        for line in terminal_lines(found.account):
+            self.tell(f"{at.name}: {line} ({ACCOUNT})")
+        return scene
+
+
+@contextmanager
+def _ending() -> Iterator[None]:
+    """A file that cannot be used ends the run with one sentence."""
     from pytest_simbench.scene import SceneError
     from pytest_simbench.simulator import SimulatorError
 
-    given = options.value(request.config, "sim_scene")
-    if path is None and not given:
-        pytest.skip("this test takes the scene of --sim-scene FILE, and none was named")
-    at = Path(given) if path is None else request.path.parent / path
     try:
-        found = read_scene_file(at)
-        scene = found.scene
-        rows: tuple[Start, ...] = ()
-        if starts == KEYFRAMES:
-            rows = scene.starts
-            if not rows:
-                raise SceneError(f"{at} has no keyframes; name a file of starts, or none")
-        elif starts is not None:
-            rows = read_starts(request.path.parent / starts, scene)
-        scene = replace(scene, starts=rows)
-        if (different := distinct(rows)) < len(rows):
-            tell(
-                f"{starts}: {len(rows)} starts, and {different} different in how the bodies lie to "
-                f"each other: as evidence they count as {different}"
-            )
+        yield
     except (SimulatorError, SceneError) as error:
         pytest.exit(str(error), returncode=pytest.ExitCode.USAGE_ERROR)
-    write_whole(folder, ACCOUNT, markdown(at.name, found.account).encode())
-    for line in terminal_lines(found.account):
-        tell(f"{at.name}: {line} ({ACCOUNT})")
-    return scene

@@ -93,8 +93,8 @@ OPTIONS = (
     Option("--robot", read.robot, "robot that does the tasks: a name (simbench robots), a robot "
            "file (.toml), or all built-in ones (default: panda)", None, "NAME|FILE|all",
            long="--sim-robot"),
-    Option("--sim-scene", read.file, "scene (MJCF) that the fixture `scene_file` gives; alone it "
-           "runs the tests of suites/test_scene.py", None, "FILE", ini=""),
+    Option("--sim-scene", read.file, "scene (MJCF, URDF) that the fixture `scene_file` gives; "
+           "alone it runs the tests of suites/test_scene.py", None, "FILE", ini=""),
     Option("--sim-history", read.releases, "run the last N releases of a simulator, missing ones "
            "are installed; :minor, the last of each minor version; what an earlier history here "
            "has recorded is not run again", None, "NAME:N[:minor]", ini=""),

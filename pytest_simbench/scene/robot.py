@@ -24,6 +24,9 @@ WIDEST = 6.0
 FARTHEST = 10.0
 """Limits of a slider without any [m]."""
 
+FASTEST = 1000.0
+"""Largest speed of a joint, which a file does not limit [rad/s or m/s]."""
+
 FREE = 1e-6
 """Stiffness [N m/rad, N/m] and largest effort [N m, N] of a drive that leaves its joint free: less
 than a millionth of all that acts here. Of 0, engines that divide by a stiffness make no number, and
@@ -116,20 +119,24 @@ class Gripper(Wire):
 @dataclass(frozen=True)
 class Closure(Wire):
     """What closes a loop of links, which no tree of joints has: a point of one link is held at a
-    point of another, and both turn freely about it (a ball and its socket).
+    point of another, and both turn freely about it (a ball and its socket), or not at all.
 
     Attributes:
         first, second: links of the robot's URDF.
         first_point, second_point: the points, each in the frame of its link [m].
+        rigid: a weld: the links keep how they are turned to each other where the joints start.
 
     Raises:
         SceneError: a link that is held at itself, or a number that is none.
     """
 
+    optional = ("rigid",)
+
     first: str
     second: str
     first_point: Vector3 = (0.0, 0.0, 0.0)
     second_point: Vector3 = (0.0, 0.0, 0.0)
+    rigid: bool = False
 
     def __post_init__(self) -> None:
         for name in (self.first, self.second):

@@ -10,7 +10,9 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.arm_following import ArmFollowing, CorrectedArmFollowing
     from pytest_simbench.tasks.arm_pushing import ArmPushing
     from pytest_simbench.tasks.base import Jitter, Moment, Outcome, Task
+    from pytest_simbench.tasks.holding import Holding
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
+    from pytest_simbench.tasks.replaying import Log, Replaying
     from pytest_simbench.tasks.settling import Settling, rests_on
     from pytest_simbench.tasks.stacking import Stacking
     from pytest_simbench.tasks.throwing import Throwing
@@ -18,9 +20,9 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.towers import LeaningTowers
 
 __all__ = [
-    "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Jitter",
-    "LeaningTowers", "Moment", "Outcome", "Pushing", "Settling", "Stacking", "Task", "Throwing",
-    "Tossing",
+    "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Holding", "Jitter",
+    "LeaningTowers", "Log", "Moment", "Outcome", "Pushing", "Replaying", "Settling", "Stacking",
+    "Task", "Throwing", "Tossing",
     "rests_on",
 ]  # fmt: skip
 
@@ -28,7 +30,9 @@ _MODULES = {
     "arm_following": ("ArmFollowing", "CorrectedArmFollowing"),
     "arm_pushing": ("ArmPushing",),
     "base": ("Jitter", "Moment", "Outcome", "Task"),
+    "holding": ("Holding",),
     "pushing": ("CurvePushing", "Pushing"),
+    "replaying": ("Log", "Replaying"),
     "settling": ("Settling", "rests_on"),
     "stacking": ("Stacking",),
     "throwing": ("Throwing",),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from typing import Any, ClassVar
@@ -14,15 +12,17 @@ from pytest_simbench.client.world import Motion, World
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene, SceneError
+from pytest_simbench.scene import Body, FloatArray, Pose, Scene, SceneError
 from pytest_simbench.scene.penetration import penetration
-from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
-
-RESTLESS = 0.5
-"""The last seconds over which it is measured how calmly the bodies rest [s]."""
-
-LOG_PERIOD = 0.01
-"""Between two samples of them [s]."""
+from pytest_simbench.tasks.base import Count, Jitter, Outcome
+from pytest_simbench.tasks.on_scene import (
+    FARTHEST,
+    RESTLESS,
+    OnScene,
+    places,
+    started,
+    ways,
+)
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ rests_on = RestsOn
 
 
 @dataclass(frozen=True)
-class Settling(Task):
+class Settling(OnScene):
     """Leave a scene to itself and see where its free bodies end.
 
     `--jitter` does not count here: the scene starts as it is written, or moved by `moved`.
@@ -66,11 +66,8 @@ class Settling(Task):
     """
 
     name: ClassVar[str] = "settling"
-    study_timeout: ClassVar[float] = 600.0
     references: ClassVar[Mapping[str, float]] = {"premises": 1.0}
-    shares_worker: ClassVar[bool] = True
 
-    world: Scene
     premises: Sequence[RestsOn] = ()
     seconds: float = 2.5
     moved: float = 0.0
@@ -97,8 +94,7 @@ class Settling(Task):
             *(Metric("premises", "premises that hold", kind="share", of=len(self.premises),
                      doc=f"share of what should be true at the end: {told}")
               for _ in self.premises[:1]),
-            Metric("farthest", "farthest from the start", unit="mm", better=None, least=0,
-                   doc="of the free body that is farthest from where it started, at the end"),
+            FARTHEST,
             Metric("tilt", "largest tilt", unit="deg", better=None, least=0,
                    doc="of the free body that has turned most from the vertical since the start"),
             Metric("sunk", "deepest overlap", unit="mm", least=0, better="lower",
@@ -111,21 +107,14 @@ class Settling(Task):
         return replace(self, seconds=min(self.seconds, 1.0))
 
     def parameters(self) -> dict[str, Any]:
-        """The scene by its digest."""
-        wire = json.dumps(self.world.to_wire(), sort_keys=True, default=float).encode()
-        return {
-            "task.scene": self.world.name,
-            "task.scene_digest": hashlib.sha256(wire).hexdigest()[:16],
+        return super().parameters() | {
             "task.premises": [str(premise) for premise in self.premises],
             "task.seconds": self.seconds,
             "task.moved": self.moved,
-            "task.starts": len(self.world.starts),
         }
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        scene, rng = self.world, np.random.default_rng(seed)
-        if scene.starts:
-            scene = scene.at_start(scene.starts[seed % len(scene.starts)])
+        scene, rng = super().scene(seed, jitter), np.random.default_rng(seed)
         if self.moved:
             for body in scene.free_bodies:
                 x, y = rng.uniform(-self.moved, self.moved, 2)
@@ -133,35 +122,26 @@ class Settling(Task):
         return scene
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        free = world.scene.free_bodies
-        with world.phase("settle"):
-            world.wait(max(self.seconds - RESTLESS, RESTLESS))
-        with world.phase("rest"):
-            rest = world.wait(RESTLESS, log_period=LOG_PERIOD)
-        assert rest is not None  # a log was asked for
-        ends = {body.name: body.moved_to(world.pose(body.name)) for body in free}
-        robot = world.scene.robot
-        prepared = None if robot is None else PreparedRobot(robot)
-        before = {body.name: _place(body) for body in free} | _links(prepared, None)
-        after = {name: _place(body) for name, body in ends.items()}
-        after |= _links(prepared, world.joints[0])
-        ways = {
-            name: float(np.linalg.norm(np.subtract(place.position, before[name].position)))
-            for name, place in after.items()
-        }
-        tilts = {name: tilted(before[name], place) for name, place in after.items()}
-        failed = [str(p) for p in self.premises if not _holds(p, ends, tilts)]
+        scene = world.scene
+        rest = self.rest(world, self.seconds, "settle")
+        prepared = None if scene.robot is None else PreparedRobot(scene.robot)
+        before = started(scene) | _links(prepared, None)
+        bodies = places(world)
+        after = bodies | _links(prepared, world.joints[0])
+        gone = ways(before, after)
+        tilts = {name: tilted(before[name], pose) for name, pose in after.items()}
+        failed = [str(p) for p in self.premises if not _holds(p, bodies, tilts)]
         metrics: dict[str, float | None] = {
-            "farthest": 1000 * max(ways.values()),
+            "farthest": max(gone.values()),
             "tilt": max(tilts.values()),
-            "sunk": 1000 * deepest(world.scene, ends),
-            "restless": 1000 * _speed(rest) if free else None,
+            "sunk": 1000 * deepest(scene, _ends(world)),
+            "restless": 1000 * _speed(rest) if bodies else None,
         }
         if self.premises:
             metrics["premises"] = 1 - len(failed) / len(self.premises)
         details = {
-            "places": {name: place.as_array().tolist() for name, place in after.items()},
-            "ways": {name: round(1000 * way, 4) for name, way in ways.items()},
+            "places": {name: pose.as_array().tolist() for name, pose in after.items()},
+            "ways": {name: round(way, 4) for name, way in gone.items()},
             "tilts": {name: round(tilt, 4) for name, tilt in tilts.items()},
         }
         return Outcome(metrics, details, reasons=tuple(f"not: {text}" for text in failed))
@@ -181,30 +161,21 @@ def _links(prepared: PreparedRobot | None, positions: FloatArray | None) -> dict
     }
 
 
-def _file_frame(body: Body) -> Pose:
-    return body.file_frame if isinstance(body, Compound) else Pose()
-
-
-def _place(body: Body) -> Pose:
-    """Of the frame that its file gives it, in the world."""
-    return body.pose * _file_frame(body)
-
-
-def _origin(body: Body) -> FloatArray:
-    return np.array(_place(body).position)
-
-
 def tilted(before: Pose, after: Pose) -> float:
     """By what angle that direction of a body which was vertical has turned away from it [deg]."""
     upright = after.rotation() @ before.rotation().T
     return float(np.degrees(np.arccos(np.clip(upright[2, 2], -1.0, 1.0))))
 
 
-def _holds(premise: RestsOn, ends: Mapping[str, Body], tilts: Mapping[str, float]) -> bool:
-    body, support = _origin(ends[premise.body]), _origin(ends[premise.support])
+def _holds(premise: RestsOn, ends: Mapping[str, Pose], tilts: Mapping[str, float]) -> bool:
+    body, support = (np.array(ends[name].position) for name in (premise.body, premise.support))
     beside = float(np.hypot(*(body - support)[:2]))
     above = body[2] > support[2]
     return bool(beside <= premise.within and above and tilts[premise.body] <= premise.tilt)
+
+
+def _ends(world: World) -> dict[str, Body]:
+    return {body.name: body.moved_to(world.pose(body.name)) for body in world.scene.free_bodies}
 
 
 def deepest(scene: Scene, ends: Mapping[str, Body]) -> float:

@@ -91,7 +91,7 @@ def planted_faults_are_seen(subject: Subject) -> None:
     for faults in rounds(capabilities, robot_faults(robot) if robot else FAULTS):
         found = planted(subject, faults.values())
         for name, fault in faults.items():
-            if any(fault.word == d.only and d.within is None for d in lacking):
+            if any(d.only == fault.word and d.quantity and d.within is None for d in lacking):
                 continue
             if fault.quantity not in found.wrong and fault.quantity not in found.untold:
                 missed.append(f"{name} ({fault.what}): {fault.quantity} equals the true scene's")

@@ -95,6 +95,12 @@ class DART(Simulator):
                 "", "the coupling is one-way: the first finger does not feel the second's load"
             ),
             Deviation(
+                "",
+                "contacts and drives feel m / (m + dt d + dt^2 k) of a joint's own damping d and "
+                "spring k",
+                only="passive_damping",
+            ),
+            Deviation(
                 "coupling/*",
                 "the adapter couples joints by impulses before a step; DART knows nothing of it",
                 only="coupling",

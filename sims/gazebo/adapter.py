@@ -66,7 +66,7 @@ class Gazebo(Simulator):
                 only="prescribed",
             ),
             Deviation(
-                "",
+                "joint/*/damping",
                 "the adapter gives joints no damping of their own: SDF's was not tried",
                 only="passive_damping",
             ),
@@ -76,7 +76,9 @@ class Gazebo(Simulator):
                 only="joint_friction",
             ),
             Deviation(
-                "", "the adapter gives joints no springs: SDF's were not tried", only="spring"
+                "joint/*/stiffness",
+                "the adapter gives joints no springs: SDF's were not tried",
+                only="spring",
             ),
             Deviation(
                 "", "the adapter commands velocities: it holds what has a motor alone", only="motor"

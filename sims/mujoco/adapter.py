@@ -22,7 +22,6 @@ from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
-    NotSupportedError,
     Simulator,
     SimulatorInfo,
     lazy_import,
@@ -152,10 +151,8 @@ class MuJoCo(Simulator):
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         if self._own_file is not None:
-            raise NotSupportedError(
-                "in the profile `file` the file's own actuators move its joints; choose another "
-                "profile for motions"
-            )
+            self._own_file.command(position, velocity, effort)
+            return
         self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
 
     def push(self, wrenches: FloatArray) -> None:

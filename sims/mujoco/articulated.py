@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pytest_simbench.description import rounded
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED
 from pytest_simbench.description.robot_files import digest, keep
 from pytest_simbench.description.stl import written_stl
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape, write_joint, write_link
 from pytest_simbench.scene import FloatArray, Gripper, Joint, Polytope, Pose, Robot
-from pytest_simbench.scene.polytope import MOST
 from pytest_simbench.scene.pose import vector3
-from pytest_simbench.scene.robot import FARTHEST, FREE, WIDEST
+from pytest_simbench.scene.robot import FARTHEST, FASTEST, FREE, WIDEST
 from pytest_simbench.simulator import lazy_import
 
 from .actuators import Drive, drive_of
@@ -32,9 +32,6 @@ mujoco = lazy_import("mujoco")
 
 MOUNT = "mount"
 """The link that is fixed in the world."""
-
-FASTEST = 1000.0
-"""Largest speed of a joint, which a file does not limit [rad/s or m/s]."""
 
 BETWEEN = 1e-3
 """Share of a body's mass and inertia that a link between two of its joints has."""
@@ -146,7 +143,7 @@ class Tree:
         geoms = [g for link in self.links if link.whole for g in self.reading.geoms_of(link)]
         frictions = self.model.geom_friction[geoms, 0] if geoms else np.ones(1)
         self._tell(frictions)
-        constraints = Constraints(self)
+        constraints = Constraints(self, [joint.initial_position for joint in joints])
         ET.indent(root)
         return Robot(
             name="tree",
@@ -169,14 +166,14 @@ class Tree:
             return MOUNT
         return next((k.name for k in self.links if k.body == root and k.whole), None)
 
-    def frame_of(self, name: str) -> Pose:
-        """Of the link of that name, in the file's world."""
-        found = (self._frame(link) for link in self.links if link.name == name)
+    def frame_of(self, name: str, data: Any) -> Pose:
+        """Of the link of that name, in the file's world, where the joints are in the data."""
+        found = (self._frame(link, data) for link in self.links if link.name == name)
         return next(found, Pose())
 
-    def _frame(self, link: OnJoint) -> Pose:
+    def _frame(self, link: OnJoint, data: Any = None) -> Pose:
         """Of the link, at its joint, in the file's world."""
-        return self.reading.pose(link.body) * Pose(vector3(self.model.jnt_pos[link.joint]))
+        return self.reading.pose(link.body, data) * Pose(vector3(self.model.jnt_pos[link.joint]))
 
     def _link(self, link: OnJoint) -> Link:
         mass, centre, tensor = self.reading.inertial(link.body)
@@ -195,16 +192,10 @@ class Tree:
         kind = kinds(self.model.geom_type[geom])
         if kind == kinds.mjGEOM_BOX:
             return Shape(pose, size=(2 * a, 2 * b, 2 * c))
-        ways = directions(MOST)
         if kind == kinds.mjGEOM_CYLINDER:
-            angles = np.linspace(0, 2 * np.pi, MOST // 2, endpoint=False)
-            ring = a * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-            ends = [np.hstack([ring, np.full((len(ring), 1), z)]) for z in (-b, b)]
-            points, gap = np.concatenate(ends), a * (1 - np.cos(np.pi / len(ring)))
+            points, gap = rounded.cylinder(a, b)
         elif kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE):
-            half = b if kind == kinds.mjGEOM_CAPSULE else 0.0
-            points = a * ways + np.array([0.0, 0.0, half]) * np.sign(ways[:, 2:])
-            gap = a * (1 - float((directions(400) @ ways.T).max(axis=1).min()))
+            points, gap = rounded.capsule(a, b if kind == kinds.mjGEOM_CAPSULE else 0.0)
         elif kind == kinds.mjGEOM_MESH:
             corners, own = self.reading.hull(geom)
             points, gap, pose = np.array(corners), 0.0, pose * own
@@ -267,10 +258,3 @@ class Tree:
             gap = 1000 * max(self._coarse.values())
             reason = f"round shapes of links are hulls of corners, up to {gap:.2g} mm smaller"
             tell("geom size (round, of links)", APPROXIMATED, reason, self._coarse)
-
-
-def directions(count: int) -> FloatArray:
-    """Unit vectors, spread evenly over all directions (a spiral), (count, 3)."""
-    z = 1 - (2 * np.arange(count) + 1) / count
-    angle, flat = np.pi * (3 - np.sqrt(5)) * np.arange(count), np.sqrt(1 - z**2)
-    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)

@@ -1,7 +1,4 @@
-"""A file's equality constraints between links: points held together, and joints that move together.
-
-A weld is three points that are held together, not on one line: then nothing turns.
-"""
+"""A file's equality constraints between links: what is held together, and what moves together."""
 
 from __future__ import annotations
 
@@ -19,9 +16,6 @@ if TYPE_CHECKING:
 
 mujoco = lazy_import("mujoco")
 
-WIDE = 0.1
-"""Distance of a weld's second and third point from its first [m]."""
-
 OPEN = 1e-6
 """What is held together may be apart by this where the file starts [m; rad]."""
 
@@ -29,13 +23,21 @@ OPEN = 1e-6
 class Constraints:
     """Those of a tree of links; told is what became of each.
 
+    Args:
+        tree: of links.
+        starts: where its joints start, from where the file is written [rad or m].
+
     Attributes:
         closures, couplings: of the robot.
         carried: numbers of the constraints that they stand for.
     """
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: Tree, starts: list[float]) -> None:
         self.tree, self.reading, self.model = tree, tree.reading, tree.model
+        self.data = mujoco.MjData(self.model)
+        at = self.model.jnt_qposadr[[link.joint for link in tree.links]]
+        self.data.qpos[at] += starts
+        mujoco.mj_kinematics(self.model, self.data)
         self.closures: list[Closure] = []
         self.couplings: list[Coupling] = []
         self.carried: set[int] = set()
@@ -89,13 +91,11 @@ class Constraints:
         if gap > OPEN:
             self._tell(k, kind, f"where the file starts, it is open by {gap:.3g} m or rad")
             return
-        aside = ([0.0, 0.0, 0.0], [WIDE, 0.0, 0.0], [0.0, WIDE, 0.0])[: 3 if weld else 1]
         if first != second:
-            frames = [self.tree.frame_of(name).inverse() for name in (first, second)]
-            for way in aside:
-                point = Pose(vector3(anchor + np.array(way)))
-                places = [(frame * point).position for frame in frames]
-                self.closures.append(Closure(first, second, places[0], places[1]))
+            point = Pose(vector3(anchor))
+            frames = (self.tree.frame_of(name, self.data) for name in (first, second))
+            a, b = ((frame.inverse() * point).position for frame in frames)
+            self.closures.append(Closure(first, second, a, b, rigid=weld))
         self._tell(k, kind, "")
 
     def _ends(self, k: int) -> tuple[str, str, FloatArray, float] | None:
@@ -109,7 +109,8 @@ class Constraints:
         names = [self.tree.link_of(reading.root(body)) for body in bodies]
         if names[0] is None or names[1] is None:
             return None
-        frames = [reading.site_pose(o) if at_sites else reading.pose(o) for o in objects]
+        pose = reading.site_pose if at_sites else reading.pose
+        frames = [pose(o, self.data) for o in objects]
         if at_sites:
             turned = frames[0].inverse() * frames[1] if weld else Pose()
             points = [np.asarray(frame.position) for frame in frames]

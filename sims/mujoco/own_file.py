@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.carried import CARRIED
+from pytest_simbench.description.carried import CARRIED, named
 from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.pose import quaternion_product
@@ -36,7 +36,7 @@ EXCUSED = {
 }
 """Quantities in which the file may differ from its scene, by those of the account."""
 
-OF_JOINTS = "joint/* link/* gripper/* body/*/touches ground/touches"
+OF_JOINTS = "joint/* link/* gripper/* coupling/* closure/* body/*/touches ground/touches"
 """Quantities of joints and links, which are not read back of a file."""
 
 
@@ -53,9 +53,9 @@ class OwnFile:
     """
 
     def __init__(self, scene: Scene, timestep: float) -> None:
-        if not scene.file:
+        if not scene.file or scene.file.lower().endswith(".urdf"):
             raise NotSupportedError(
-                f"scene {scene.name!r} was read from no file, and the profile `file` loads files; "
+                f"scene {scene.name!r} was read from no MJCF file, which the profile `file` loads; "
                 "choose another profile"
             )
         self.reading = reading = Reading(scene.file)
@@ -89,6 +89,7 @@ class OwnFile:
         self._joint_q, self._joint_v = self.model.jnt_qposadr[held], self.model.jnt_dofadr[held]
         self._centres = np.array([p.frame.position for p in free]).reshape(-1, 3)
         self._turns = [p.frame.quaternion for p in free]
+        self._drives = [(k, d) for k, d in enumerate(reading.tree.drives) if d.stiffness]
         if scene.robot is not None:  # as written, or at the end of a range that begins elsewhere
             zero = self.model.qpos0[self._joint_q]
             self.data.qpos[self._joint_q] = zero + scene.robot.column("initial_position")
@@ -109,11 +110,21 @@ class OwnFile:
         other = [Deviation("", told, only="file")] if steps[0] != steps[1] else []
         if self.reading.links:
             other.append(Deviation(OF_JOINTS, "joints, links and drives are the file's own"))
+        held = {k for k, _ in self._drives}
+        if free := [link.told for k, link in enumerate(self.reading.links) if k not in held]:
+            told = f"no command reaches joints without a position actuator: {named(free)}"
+            other.append(Deviation("", told))
         return *other, *(
             Deviation(EXCUSED[line.quantity], f"as the file has it: {line.reason}", only="file")
             for line in lines
             if line.quantity in EXCUSED
         )
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        """As `Simulator.command`, by the file's own actuators."""
+        for k, drive in self._drives:
+            lead = (drive.damping * velocity[k] + effort[k]) / drive.stiffness
+            self.data.ctrl[drive.numbers] = drive.controls(position[k] + lead)
 
     def joint_state(self) -> FloatArray:
         """As `Simulator.joint_state`: from the posture in which the file is written."""

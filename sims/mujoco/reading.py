@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
+from pytest_simbench.description.rounded import directions
 from pytest_simbench.description.urdf import ROOT
 from pytest_simbench.scene import (
     Body,
@@ -38,7 +39,7 @@ from pytest_simbench.scene.scene import ROOM
 from pytest_simbench.simulator import DescriptionError, lazy_import
 
 from .account import tell_the_rest, values_of
-from .articulated import MOUNT, OnJoint, Tree, directions, on_joints
+from .articulated import MOUNT, OnJoint, Tree, on_joints
 from .touching import apart
 
 mujoco = lazy_import("mujoco")
@@ -189,17 +190,18 @@ class Reading:
 
     # Bodies
 
-    def pose(self, body: int) -> Pose:
-        """Of a body in the file's world."""
-        return _pose(self.data.xpos[body], self.data.xquat[body])
+    def pose(self, body: int, data: Any = None) -> Pose:
+        """Of a body in the file's world; by other data, where the joints stand elsewhere."""
+        data = data or self.data
+        return _pose(data.xpos[body], data.xquat[body])
 
     def geom_pose(self, geom: int) -> Pose:
         """Of a shape in the file's world."""
         return _pose(self.data.geom_xpos[geom], _quaternion(self.data.geom_xmat[geom]))
 
-    def site_pose(self, site: int) -> Pose:
-        """Of a site in the file's world."""
-        return _pose(self.data.site_xpos[site], _quaternion(self.data.site_xmat[site]))
+    def site_pose(self, site: int, data: Any) -> Pose:
+        """The same of a site."""
+        return _pose(data.site_xpos[site], _quaternion(data.site_xmat[site]))
 
     def _placed(self, name: str, root: int, geoms: list[int]) -> Placed:
         model = self.model
@@ -375,7 +377,7 @@ class Reading:
             lowest = [-float(p.body.reach_placed(down)[0]) for p in moved if p.root]
             self.lift = max(0.0, -min(lowest, default=0.0))
             friction = max((p.body.friction for p in placed), default=1.0)
-            reason = "the file has none; a level ground at z = 0 is there in addition"
+            reason = "the file has none; a level ground at z = 0 is there, which free bodies touch"
             self.tell("geom plane", APPROXIMATED, reason)
         if self.lift:
             reason = f"all is moved up by {self.lift:g} m, so that the ground is at z = 0"

@@ -48,20 +48,25 @@ def apart(reading: Reading) -> tuple[Pairs, bool]:
         told = [f"{names[a]} and {names[b]}" for a, b in np.argwhere(partly)]
         reason = "in the file some of their shapes do not collide, here all do"
         reading.tell("geom contype, conaffinity (of single shapes)", APPROXIMATED, reason, told)
-    return tuple((names[a], names[b]) for a, b in np.argwhere(never).tolist()), together
+    pairs = [(names[a], names[b]) for a, b in np.argwhere(never).tolist()]
+    if reading.ground is None:  # the scene has one, which is not the file's
+        pairs += [("ground", name) for name in names if name.startswith("link/")]
+    return tuple(pairs), together
 
 
 def _collide(reading: Reading, geoms: list[int]) -> FloatArray:
     """1 for each two of these that MuJoCo lets collide, else 0: its rules, from its documentation
     ("Computation, Collision detection"): same body, parent and child, masks; pairs by name do."""
-    model = reading.model
+    model, off = reading.model, mujoco.mjtDisableBit
+    if model.opt.disableflags & (off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT):
+        return np.zeros((len(geoms), len(geoms)))
     kind, affinity = model.geom_contype[geoms], model.geom_conaffinity[geoms]
     meet = (kind[:, None] & affinity) | (affinity[:, None] & kind) > 0
     body = model.geom_bodyid[geoms]
     weld = model.body_weldid[body]
     above = model.body_weldid[model.body_parentid[weld]]
     meet &= weld[:, None] != weld
-    if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT:
+    if not model.opt.disableflags & off.mjDSBL_FILTERPARENT:
         family = (weld[:, None] == above) | (above[:, None] == weld)
         meet &= ~(family & (weld[:, None] != 0) & (weld != 0))
     signature = (np.minimum(body[:, None], body) << 16) + np.maximum(body[:, None], body)

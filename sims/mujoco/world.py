@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.links import reduced
+from pytest_simbench.description.links import frames, reduced
 from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
-    Closure,
     ConvexMesh,
     Coupling,
     Cylinder,
@@ -72,7 +71,7 @@ def _equip(spec: Any, prepared: PreparedRobot, settings: MuJoCoSettings) -> None
         _add_drive(spec, joint)
     for pair in (*robot.gripper.couplings, *robot.couplings):
         _couple(spec, pair)
-    close_loops(spec, reduced(prepared))
+    close_loops(spec, prepared)
     for moved in prepared.joints if robot.self_collide else ():
         # MuJoCo parts what one joint joins by itself, but where one link is fixed in the world.
         spec.add_exclude(bodyname1=moved.parent, bodyname2=moved.child)
@@ -228,23 +227,22 @@ def _couple(spec: Any, pair: Coupling) -> None:
     )
 
 
-def close_loops(spec: Any, closures: Iterable[Closure]) -> None:
-    """Hold the points together, as stiffly as the step allows.
+def close_loops(spec: Any, prepared: PreparedRobot) -> None:
+    """Hold points of links together, and how they are turned, as stiffly as the step allows.
 
     MuJoCo's `connect` takes the point of the first link, and finds that of the second at the
     model's own zero posture, where the loop is open. So two sites are held together.
     """
-    for k, closure in enumerate(closures):
+    kinds = mujoco.mjtEq
+    for k, closure in enumerate(reduced(prepared)):
         names = []
-        for link, point in (
-            (closure.first, closure.first_point),
-            (closure.second, closure.second_point),
-        ):
+        links = (closure.first, closure.second)
+        for link, frame in zip(links, frames(prepared, closure), strict=True):
             names.append(f"closure {k} {link}")
-            spec.body(link).add_site(name=names[-1], pos=point)
+            spec.body(link).add_site(name=names[-1], pos=frame.position, quat=frame.quaternion)
         spec.add_equality(
             name=f"closure {k}",
-            type=mujoco.mjtEq.mjEQ_CONNECT,
+            type=kinds.mjEQ_WELD if closure.rigid else kinds.mjEQ_CONNECT,
             objtype=mujoco.mjtObj.mjOBJ_SITE,
             name1=names[0],
             name2=names[1],
@@ -255,7 +253,8 @@ def close_loops(spec: Any, closures: Iterable[Closure]) -> None:
 def closed(model: Any, active: Any) -> list[FloatArray]:
     """The points of each active closure, held by two sites or, as with Newton, by two bodies with a
     point each."""
-    loops = np.flatnonzero((model.eq_type == mujoco.mjtEq.mjEQ_CONNECT) & active)
+    kinds = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
+    loops = np.flatnonzero(np.isin(model.eq_type, kinds) & active)
     return [_points(model, number) for number in loops.tolist()]
 
 

@@ -68,6 +68,11 @@ class PyBullet(Simulator):
                 "joint/*/stiffness joint/*/damping",
                 "position motors are velocity constraints, neither springs nor dampers",
             ),
+            Deviation(
+                "",
+                "damping and springs of joints are pushed by the adapter, once a step",
+                only="passive_damping",
+            ),
             Deviation("joint/*/effort_limit", "Bullet keeps its motors' largest force to itself"),
             Deviation("body/*/damping link/*/damping", "Bullet keeps its damping to itself"),
             Deviation(

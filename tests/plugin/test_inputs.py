@@ -188,3 +188,64 @@ def test_without_a_file_the_test_is_skipped_and_says_so(pytester: pytest.Pyteste
     found = pytester.runpytest("--sim", "mujoco", "-rs")
     found.assert_outcomes(skipped=1)
     found.stdout.fnmatch_lines(["*takes the scene of --sim-scene FILE*"])
+
+
+FOLLOWING = """
+from pytest_simbench.tasks import Replaying
+
+def test_it_follows(repeat, scene_file):
+    scene = scene_file("door.xml")
+    repeat(Replaying(scene, scene_file.log("run.csv", scene)))
+"""
+
+
+@pytest.mark.engine
+def test_a_log_beside_the_test_is_followed_and_a_broken_one_ends_the_run(
+    pytester: pytest.Pytester,
+) -> None:
+    joint = '<joint name="hinge"/><geom type="box" size=".2 .1 .01" pos=".2 0 0"/>'
+    drive = '<actuator><position joint="hinge" kp="500" kv="50"/></actuator>'
+    (pytester.path / "door.xml").write_text(
+        f'<mujoco><worldbody><body pos="0 0 1">{joint}</body></worldbody>{drive}</mujoco>'
+    )
+    log = pytester.path / "run.csv"
+    log.write_text("time,hinge\n0,0\n0.5,0.05\n1,0.05\n")
+    pytester.makepyfile(FOLLOWING)
+    found = pytester.runpytest_subprocess("--sim", "mujoco", "--sim-output=run", "--reps=1")
+    found.assert_outcomes(passed=1)
+    (record,) = records(pytester.path / "run")
+    assert record["details"]["joints"]["hinge"] == pytest.approx(0.05, abs=0.01)
+    assert 0.0 < record["metrics"]["worst_hinges"] < 2.0
+    log.write_text("time,hinge\n0,0\n0.5,nan\n")
+    found = pytester.runpytest_subprocess("--sim", "mujoco")
+    assert found.ret == pytest.ExitCode.USAGE_ERROR
+    found.stdout.fnmatch_lines(["*the log * has no finite number of 'hinge' in row 1*"])
+
+
+CABINET = """
+<robot name="cabinet"><link name="carcass"/>
+  <link name="drawer">
+    <inertial><mass value="2"/>
+      <inertia ixx=".02" iyy=".02" izz=".02" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><box size=".2 .2 .2"/></geometry></collision>
+  </link>
+  <joint name="rail" type="prismatic"><parent link="carcass"/><child link="drawer"/>
+    <origin xyz="0 0 .5"/><axis xyz="0 0 1"/><limit lower="-.2" upper=".3" effort="5"/></joint>
+</robot>
+"""
+
+
+@pytest.mark.engine
+def test_a_urdf_is_a_scene_and_a_broken_one_ends_the_run(pytester: pytest.Pytester) -> None:
+    path = pytester.path / "cabinet.urdf"
+    path.write_text(CABINET)
+    asked = "--sim-scene", str(path), "--sim", "mujoco", "--sim-output=run"
+    found = pytester.runpytest_subprocess(*asked, "-k", "not step and not mm")
+    found.assert_outcomes(passed=1)
+    (record,) = records(pytester.path / "run")
+    assert record["metrics"]["farthest"] == pytest.approx(200, abs=5)  # onto its stop
+    assert "limit effort, velocity | not carried" in (pytester.path / "run/carried.md").read_text()
+    path.write_text(CABINET.replace('value="2"', 'value="-2"'))
+    found = pytester.runpytest_subprocess(*asked)
+    assert found.ret == pytest.ExitCode.USAGE_ERROR
+    found.stderr.fnmatch_lines(["ERROR: --sim-scene: *cabinet.urdf, line 4: *mass -2 kg*"])

@@ -1,0 +1,81 @@
+"""A keyframe of a user's scene is held by its drives: how far do its joints go, how calmly?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pytest_simbench.client.world import World
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.scene import FloatArray, Trajectory
+from pytest_simbench.tasks.base import Count, Outcome
+from pytest_simbench.tasks.on_scene import (
+    FARTHEST,
+    LOG_PERIOD,
+    RESTLESS,
+    OnJoints,
+    places,
+    started,
+    ways,
+)
+
+
+@dataclass(frozen=True)
+class Holding(OnJoints):
+    """Start a scene at a keyframe and tell its drives what that tells them.
+
+    Attributes:
+        world: the scene. Repetitions go through its `starts` (keyframes); without any, each joint
+            is held where it is written.
+        seconds: simulated time [s].
+
+    Raises:
+        SceneError: the scene has no joints.
+    """
+
+    name: ClassVar[str] = "holding"
+
+    seconds: float = 2.5
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        speeds = f"root mean square speed in the last {RESTLESS:g} s, of the joint with the largest"
+        return (
+            *self.metric_by_kind("gone", "farthest joint", "from its start, at the end"),
+            *self.metric_by_kind("restless", "restless", speeds, per="/s"),
+            *(FARTHEST for _ in self.world.free_bodies[:1]),
+        )
+
+    def smoke(self) -> Holding:
+        return replace(self, seconds=min(self.seconds, 1.0))
+
+    def parameters(self) -> dict[str, Any]:
+        return super().parameters() | {"task.seconds": self.seconds}
+
+    def targets(self, seed: int) -> FloatArray:
+        """What the drives are told, (n_joints,) [rad or m]."""
+        start = self.start(seed)
+        written = tuple(self.robot.column("initial_position"))
+        return np.array(written if start is None else start.targets or start.positions or written)
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        before, targets = world.joints[0], self.targets(seed)
+        world.follow(Trajectory.holding(LOG_PERIOD, targets))
+        rest = self.rest(world, self.seconds, "hold")
+        gone = world.joints[0] - before
+        metrics = self.by_kind("gone", np.abs(gone))
+        # From positions: the speeds that an engine tells may be others.
+        speeds = np.diff(rest.joints[:, 0], axis=0) / np.diff(rest.time)[:, None]
+        metrics |= self.by_kind("restless", np.sqrt(np.mean(speeds**2, axis=0)))
+        bodies = places(world)
+        moved = ways(started(world.scene), bodies)
+        if moved:
+            metrics["farthest"] = max(moved.values())
+        details = {
+            "gone": dict(zip(self.joints, gone.tolist(), strict=True)),
+            "targets": dict(zip(self.joints, targets.tolist(), strict=True)),
+            "places": {name: pose.as_array().tolist() for name, pose in bodies.items()},
+        }
+        return Outcome(metrics, details)

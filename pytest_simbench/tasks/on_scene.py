@@ -1,0 +1,154 @@
+"""What tasks on a user's scene have in common: where it starts, and how far things went."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pytest_simbench.client.world import Motion, World
+from pytest_simbench.description.urdf import PreparedRobot
+from pytest_simbench.records.metrics import RESOLUTIONS, Metric
+from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Robot, Scene, SceneError, Start
+from pytest_simbench.tasks.base import Jitter, Task, distance
+
+RESTLESS = 0.5
+"""The last seconds over which it is measured how calmly things rest [s]."""
+
+LOG_PERIOD = 0.01
+"""Between two samples of a motion [s]."""
+
+
+@dataclass(frozen=True)
+class OnScene(Task):
+    """A task on a scene. Repetitions go through its `starts`, if it has some; `--jitter` does not
+    count.
+
+    Attributes:
+        world: the scene, of a file (`scene_file`) or made by hand.
+    """
+
+    study_timeout: ClassVar[float] = 600.0
+    shares_worker: ClassVar[bool] = True
+
+    world: Scene
+
+    def parameters(self) -> dict[str, Any]:
+        """The scene by its digest."""
+        wire = json.dumps(self.world.to_wire(), sort_keys=True, default=float).encode()
+        return {
+            "task.scene": self.world.name,
+            "task.scene_digest": digest(wire),
+            "task.starts": len(self.world.starts),
+        }
+
+    def start(self, seed: int) -> Start | None:
+        """Where a repetition starts; None: as the scene is written."""
+        starts = self.world.starts
+        return starts[seed % len(starts)] if starts else None
+
+    def scene(self, seed: int, jitter: Jitter) -> Scene:
+        start = self.start(seed)
+        return self.world if start is None else self.world.at_start(start)
+
+    def rest(self, world: World, seconds: float, phase: str) -> Motion:
+        """Wait for so long [s] and return the motion of the last `RESTLESS`."""
+        with world.phase(phase):
+            world.wait(max(seconds - RESTLESS, RESTLESS))
+        with world.phase("rest"):
+            rest = world.wait(RESTLESS, log_period=LOG_PERIOD)
+        assert rest is not None  # a log was asked for
+        return rest
+
+
+@dataclass(frozen=True)
+class OnJoints(OnScene):
+    """A task on a scene that has joints.
+
+    Raises:
+        SceneError: it has none.
+    """
+
+    def __post_init__(self) -> None:
+        if not self.joints:
+            raise SceneError(
+                f"scene {self.world.name!r} has no joints, so it has no drives to command; give "
+                "one with joints, or leave it to itself (Settling)"
+            )
+
+    @property
+    def robot(self) -> Robot:
+        assert self.world.robot is not None  # else it has no joints
+        return self.world.robot
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        return () if self.world.robot is None else self.world.robot.joint_names
+
+    @property
+    def measured(self) -> Sequence[str]:
+        """The joints of which something is measured."""
+        return self.joints
+
+    @cached_property
+    def kinds(self) -> Mapping[str, tuple[NDArray[np.bool_], float, str]]:
+        """Which of the measured joints are hinges and which are sliders, (n_joints,), where there
+        are such, the factor from rad or m to the unit in which they are measured, and that unit."""
+        kinds = {joint.name: joint.kind for joint in PreparedRobot(self.robot).joints}
+        own = [kinds[name] if name in self.measured else "" for name in self.joints]
+        found = {
+            "hinges": (np.array([kind == "revolute" for kind in own]), 180 / np.pi, "deg"),
+            "sliders": (np.array([kind == "prismatic" for kind in own]), 1000.0, "mm"),
+        }
+        return {kind: told for kind, told in found.items() if told[0].any()}
+
+    def by_kind(self, name: str, values: FloatArray) -> dict[str, float | None]:
+        """The largest of values, (n_joints,), for each kind of joint, in its unit."""
+        return {
+            f"{name}_{kind}": factor * float(values[own].max())
+            for kind, (own, factor, _) in self.kinds.items()
+        }
+
+    def metric_by_kind(self, name: str, title: str, doc: str, per: str = "") -> list[Metric]:
+        return [
+            Metric(f"{name}_{kind}", f"{title}, {kind}", unit=unit + per, better="lower", least=0,
+                   doc=doc, resolution=RESOLUTIONS[unit])
+            for kind, (_, _, unit) in self.kinds.items()
+        ]  # fmt: skip
+
+
+FARTHEST = Metric(
+    "farthest", "farthest from the start", unit="mm", better=None, least=0,
+    doc="of the free body that is farthest from where it started, at the end",
+)  # fmt: skip
+
+
+def digest(data: bytes) -> str:
+    """16 digits."""
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+def places(world: World) -> dict[str, Pose]:
+    """Of the free bodies, as they are now."""
+    return {b.name: place(b.moved_to(world.pose(b.name))) for b in world.scene.free_bodies}
+
+
+def started(scene: Scene) -> dict[str, Pose]:
+    """Of the free bodies, as a scene has them."""
+    return {body.name: place(body) for body in scene.free_bodies}
+
+
+def place(body: Body) -> Pose:
+    """Of the frame that its file gives it, in the world."""
+    return body.pose * body.file_frame if isinstance(body, Compound) else body.pose
+
+
+def ways(before: Mapping[str, Pose], after: Mapping[str, Pose]) -> dict[str, float]:
+    """How far each is from where it was [mm]."""
+    return {name: 1000 * distance(before[name], pose) for name, pose in after.items()}

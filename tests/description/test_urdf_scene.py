@@ -1,0 +1,231 @@
+"""A URDF as a scene: what moves on joints, what is told of the rest, and what is refused."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pytest_simbench.description.stl import read_stl, written_stl
+from pytest_simbench.description.urdf import PreparedRobot
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.handle import SimulatorHandle
+from pytest_simbench.experiment.scene_file import SceneFile, read_scene_file
+from pytest_simbench.scene import Coupling, Polytope
+from pytest_simbench.scene.robot import FREE, WIDEST
+from pytest_simbench.simulator import DescriptionError
+from tests.conftest import ADAPTERS, case_of
+
+CABINET = """<robot name="cabinet">
+  <material name="grey"/>
+  <link name="carcass">
+    <visual><geometry><sphere radius="1"/></geometry></visual>
+    <collision><origin xyz="-.3 0 0"/><geometry><box size=".1 .4 .6"/></geometry></collision>
+  </link>
+  <link name="drawer">
+    <inertial><mass value="2"/>
+      <inertia ixx=".02" iyy=".02" izz=".02" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><cylinder radius=".1" length=".2"/></geometry></collision>
+  </link>
+  <link name="door">
+    <inertial><mass value="1"/>
+      <inertia ixx=".02" iyy=".02" izz=".02" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><sphere radius=".05"/></geometry></collision>
+  </link>
+  <link name="handle"><collision><geometry><box size=".02 .02 .1"/></geometry></collision></link>
+  <joint name="rail" type="prismatic"><parent link="carcass"/><child link="drawer"/>
+    <axis xyz="0 0 1"/><limit lower="-.2" upper=".3" effort="5" velocity="2"/>
+    <dynamics damping="4" friction=".5"/><safety_controller k_velocity="1"/></joint>
+  <joint name="hinge" type="continuous"><parent link="carcass"/><child link="door"/>
+    <origin xyz="0 1 0"/><axis xyz="0 0 1"/></joint>
+  <joint name="grip" type="fixed"><parent link="door"/><child link="handle"/></joint>
+  <gazebo reference="door"><mu1>0.2</mu1></gazebo>
+  <transmission name="motor"/>
+</robot>
+"""
+"""It reaches 0.3 m below its origin."""
+
+
+def read(folder: Path, *changes: tuple[str, str]) -> SceneFile:
+    text = CABINET
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "cabinet.urdf").write_text(text)
+    return read_scene_file(folder / "cabinet.urdf")
+
+
+def test_joints_have_no_drives_and_the_dynamics_of_the_file(tmp_path: Path) -> None:
+    scene = read(tmp_path).scene
+    assert scene.robot is not None
+    rail, hinge = scene.robot.joints
+    assert (rail.passive_damping, rail.friction) == (4.0, 0.5)
+    assert (hinge.passive_damping, hinge.friction) == (0.0, 0.0)
+    assert {(j.stiffness, j.damping, j.effort_limit, j.armature) for j in (rail, hinge)} == {
+        (FREE, 0.0, FREE, 0.0)
+    }
+    prepared = PreparedRobot(scene.robot)
+    assert {name: list(ends) for name, ends in prepared.limits.items()} == {
+        "rail": [-0.2, 0.3], "hinge": [-WIDEST, WIDEST],
+    }  # fmt: skip
+    assert [len(link.shapes) for link in prepared.moving_links] == [1, 2]  # with its handle
+    assert (scene.name, scene.file) == ("cabinet", str(tmp_path / "cabinet.urdf"))
+
+
+def test_it_is_moved_up_onto_the_ground(tmp_path: Path) -> None:
+    assert read(tmp_path).scene.file_lift == pytest.approx(0.3)
+    higher = read(tmp_path, ('xyz="-.3 0 0"', 'xyz="-.3 0 .7"')).scene
+    assert higher.file_lift == pytest.approx(0.1)  # of the drawer
+    assert higher.robot is not None
+    assert higher.robot.base.position[2] == pytest.approx(0.1)
+
+
+def test_round_shapes_are_hulls_that_touch_them_from_inside(tmp_path: Path) -> None:
+    robot = read(tmp_path).scene.robot
+    assert robot is not None
+    drawer, door = PreparedRobot(robot).moving_links
+    for link, reach, height in ((drawer, 0.1, 0.1), (door, 0.05, 0.05)):
+        mesh = link.shapes[0].mesh
+        assert mesh is not None
+        corners = read_stl(Path(mesh).read_bytes()).reshape(-1, 3)
+        assert np.hypot(*corners.T[:2]).max() == pytest.approx(reach, rel=0.01)
+        assert np.abs(corners[:, 2]).max() == pytest.approx(height, rel=0.02)
+
+
+def test_of_everything_it_is_told_what_became_of_it(tmp_path: Path) -> None:
+    account = {line.quantity: (line.state, line.where) for line in read(tmp_path).account}
+    assert account["joint type (continuous)"] == ("approximated", "hinge")
+    assert account["geometry sphere, cylinder"] == ("approximated", "door, drawer")
+    assert account["limit effort, velocity"][0] == "not carried"
+    for tag, where in {
+        "visual": "carcass", "material": "grey", "safety_controller": "rail",
+        "gazebo": "cabinet", "transmission": "motor",
+    }.items():  # fmt: skip
+        assert account[tag] == ("not carried", where)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('mass value="2"', 'mass value="3"'),
+        ('ixx=".02"', 'ixx=".03"'),
+        ('radius=".1"', 'radius=".11"'),
+        ('radius=".05"', 'radius=".06"'),
+        ('box size=".02', 'box size=".03'),
+        ('xyz="0 1 0"', 'xyz="0 1 .1"'),
+        ('axis xyz="0 0 1"', 'axis xyz="0 1 0"'),
+        ('upper=".3"', 'upper=".4"'),
+        ('damping="4"', 'damping="5"'),
+        ('friction=".5"', 'friction=".6"'),
+        ("<dynamics", '<mimic joint="hinge"/><dynamics'),
+        ("<dynamics", '<calibration rising="0"/><dynamics'),
+        ('<link name="handle">', '<link name="handle"><sensor/>'),
+    ],
+)
+def test_nothing_is_dropped_in_silence(tmp_path: Path, old: str, new: str) -> None:
+    before = read(tmp_path)
+    after = read(tmp_path, (old, new))
+    assert before.scene != after.scene or before.account != after.account
+
+
+def test_a_joint_that_mimics_is_coupled_and_starts_where_it_belongs(tmp_path: Path) -> None:
+    follow = '<mimic joint="hinge" multiplier="2" offset="{}"/><dynamics'
+    robot = read(tmp_path, ("<dynamics", follow.format(0.1))).scene.robot
+    assert robot is not None
+    assert robot.couplings == (Coupling("rail", "hinge", 2.0, 0.1),)
+    assert robot.joints[0].initial_position == 0.1
+    found = read(tmp_path, ("<dynamics", follow.format(0.4)))
+    assert found.scene.robot is not None
+    assert not found.scene.robot.couplings
+    assert found.scene.robot.joints[0].initial_position == 0.3
+    states = {line.quantity: line.state for line in found.account}
+    assert states["mimic"] == "not carried"
+
+
+def test_a_range_that_does_not_hold_0_begins_at_its_nearest_end(tmp_path: Path) -> None:
+    found = read(tmp_path, ('lower="-.2"', 'lower=".2"'))
+    assert found.scene.robot is not None
+    assert found.scene.robot.joints[0].initial_position == 0.2
+    assert "joint limit (start)" in {line.quantity for line in found.account}
+
+
+def test_packages_are_folders_above_the_file_or_beside_one(tmp_path: Path) -> None:
+    """As ROS packages lie: `shop/urdf/cabinet.urdf`, `shop/meshes`, and `parts` beside `shop`."""
+    folder = tmp_path / "shop" / "urdf"
+    folder.mkdir(parents=True)
+    hull = Polytope([(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0), (0, 0, -0.7)])
+    for package in ("shop", "parts"):
+        (tmp_path / package / "meshes").mkdir(parents=True)
+        stl = written_stl(hull.points[np.array(hull.triangles)])
+        (tmp_path / package / "meshes" / "knob.stl").write_bytes(stl)
+        mesh = f'<mesh filename="package://{package}/meshes/knob.stl"/>'
+        assert read(folder, ('<sphere radius=".05"/>', mesh)).scene.file_lift == pytest.approx(0.7)
+    with pytest.raises(DescriptionError, match="unknown package 'other'"):
+        read(folder, ('<sphere radius=".05"/>', '<mesh filename="package://other/knob.stl"/>'))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        ('radius=".05"', 'radius="a"', "link 'door' has <sphere radius='a'>"),
+        ('length=".2"', 'length="0"', "link 'drawer' has a cylinder whose size"),
+        ('friction=".5"', 'friction="-1"', "joint 'rail' has a damping or friction"),
+        ('name="hinge" type="continuous"', 'name="hinge" type="floating"', "'hinge' is floating"),
+        (
+            '<mass value="1"/>',
+            '<mass value="0"/>',
+            "has moments of inertia and no mass",
+        ),
+        ('child link="door"', 'child link="gate"', "joint 'hinge' has the child 'gate'"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(tmp_path: Path, old: str, new: str, why: str) -> None:
+    line = CABINET[: CABINET.index(old)].count("\n") + 1
+    with pytest.raises(DescriptionError, match=f"cabinet.urdf, line {line}: .*{why}"):
+        read(tmp_path, (old, new))
+
+
+def test_without_a_file_or_a_joint_there_is_no_scene(tmp_path: Path) -> None:
+    with pytest.raises(DescriptionError, match=r"cabinet.urdf is not valid XML"):
+        read(tmp_path, ("</robot>", ""))
+    with pytest.raises(DescriptionError, match=r"none.urdf: No such file"):
+        read_scene_file(tmp_path / "none.urdf")
+    (tmp_path / "post.urdf").write_text('<robot name="post"><link name="post"/></robot>')
+    with pytest.raises(DescriptionError, match=r"post.urdf has no joint that moves"):
+        read_scene_file(tmp_path / "post.urdf")
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize("name", ADAPTERS)
+def test_in_every_engine_a_drawer_falls_to_its_stop(tmp_path: Path, case: Case, name: str) -> None:
+    """By its weight, which nothing brakes."""
+    scene = read(tmp_path, ('<dynamics damping="4" friction=".5"/>', "")).scene
+    with (
+        closing(SimulatorHandle(case_of(case, name))) as handle,
+        handle.episode(scene) as world,
+    ):
+        world.wait(1.0)
+        rail, hinge = world.joints[0]
+        assert rail == pytest.approx(-0.2, abs=5e-3)
+        assert hinge == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize("name", ADAPTERS)
+def test_a_drawer_with_damping_falls_at_its_end_speed(
+    tmp_path: Path, case: Case, name: str
+) -> None:
+    """m g = F + d v."""
+    change = ('damping="4" friction=".5"', 'damping="100" friction="5"')
+    scene = read(tmp_path, change).scene
+    with (
+        closing(SimulatorHandle(case_of(case, name))) as handle,
+        handle.episode(scene) as world,
+    ):
+        world.wait(0.3)
+        before = world.joints[0][0]
+        world.wait(0.5)
+        speed = (world.joints[0][0] - before) / 0.5
+        assert speed == pytest.approx(-(2 * 9.80665 - 5) / 100, rel=0.02)
