@@ -13,16 +13,26 @@ from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Body, FloatArray, Pose, Scene, SceneError
+from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.penetration import penetration
+from pytest_simbench.simulator import Capability
+from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from pytest_simbench.tasks.on_scene import (
     FARTHEST,
+    LOG_PERIOD,
     RESTLESS,
     OnScene,
     places,
     started,
     ways,
 )
+
+LOOKS = 10
+"""So often the forces of contacts are asked for while the bodies rest."""
+
+Forces = Mapping[tuple[str, str], FloatArray]
+"""As `World.contact_forces`."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +111,11 @@ class Settling(OnScene):
                    doc="of two bodies, or of a body and the ground, at the end"),
             Metric("restless", "restless", unit="mm/s", least=0, better="lower",
                    doc=f"root mean square speed of the bodies in the last {RESTLESS:g} s"),
+            Metric("energy", "restless energy", unit="uJ", least=0, better="lower",
+                   doc=f"mean kinetic energy of the bodies in the last {RESTLESS:g} s"),
+            Metric("force_jitter", "restless forces", unit="%", least=0, better="lower",
+                   doc=f"spread of the forces of contacts over {LOOKS} looks in the last "
+                       f"{RESTLESS:g} s, of the bodies' weight; of simulators that tell them"),
         )  # fmt: skip
 
     def smoke(self) -> Settling:
@@ -123,7 +138,9 @@ class Settling(OnScene):
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         scene = world.scene
-        rest = self.rest(world, self.seconds, "settle")
+        with world.phase("settle"):
+            world.wait(max(self.seconds - RESTLESS, RESTLESS))
+        rest, forces = _rest(world)
         prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         before = started(scene) | _links(prepared, None)
         bodies = places(world)
@@ -136,6 +153,8 @@ class Settling(OnScene):
             "tilt": max(tilts.values()),
             "sunk": 1000 * deepest(scene, _ends(world)),
             "restless": 1000 * _speed(rest) if bodies else None,
+            "energy": 1e6 * kinetic_energy(scene, rest.bodies) if bodies else None,
+            "force_jitter": spread(scene, forces),
         }
         if self.premises:
             metrics["premises"] = 1 - len(failed) / len(self.premises)
@@ -145,6 +164,46 @@ class Settling(OnScene):
             "tilts": {name: round(tilt, 4) for name, tilt in tilts.items()},
         }
         return Outcome(metrics, details, reasons=tuple(f"not: {text}" for text in failed))
+
+
+def _rest(world: World) -> tuple[Motion, list[Forces]]:
+    """The last half second, and the forces of contacts now and then in it; none where the
+    simulator does not tell them."""
+    told = Capability.CONTACT_FORCES in adapter(world.process.where.simulator).info.capabilities
+    parts: list[Motion] = []
+    forces: list[Forces] = []
+    began = world.time
+    with world.phase("rest"):
+        for k in range(1, LOOKS + 1):
+            until = began + k * RESTLESS / LOOKS
+            part = world.wait(until - world.time, log_period=LOG_PERIOD)
+            assert part is not None  # a log was asked for
+            parts.append(part)
+            if told:
+                forces.append(world.contact_forces())
+    return Motion.joined(parts), forces
+
+
+def kinetic_energy(scene: Scene, states: FloatArray) -> float:
+    """Mean over the time of that of all free bodies [J]; states as of `Motion.bodies`."""
+    masses = np.array([body.mass for body in scene.free_bodies])
+    moments = np.array([body.inertia() for body in scene.free_bodies])
+    turns = rotations(states[..., 3:7].reshape(-1, 4)).reshape(*states.shape[:2], 3, 3)
+    spins = np.einsum("tnij,tni->tnj", turns, states[..., 10:13])  # in the bodies' own axes
+    moving = masses * np.sum(states[..., 7:10] ** 2, axis=2)
+    return float(np.mean(np.sum(moving + np.sum(moments * spins**2, axis=2), axis=1)) / 2)
+
+
+def spread(scene: Scene, forces: Sequence[Forces]) -> float | None:
+    """Of the forces of all pairs over several looks, of the free bodies' weight [%]; None without
+    looks or weight."""
+    weight = sum(body.mass for body in scene.free_bodies) * float(np.linalg.norm(scene.gravity))
+    if not forces or not weight:
+        return None
+    pairs = sorted({pair for found in forces for pair in found if pair[0] < pair[1]})
+    rows = [[found[p][:3] if p in found else np.zeros(3) for p in pairs] for found in forces]
+    each = np.array(rows).reshape(len(forces), -1)
+    return 100 * float(np.sqrt(each.var(axis=0).sum())) / weight
 
 
 def _links(prepared: PreparedRobot | None, positions: FloatArray | None) -> dict[str, Pose]:
@@ -185,7 +244,11 @@ def deepest(scene: Scene, ends: Mapping[str, Body]) -> float:
     depths = [0.0]
     for k, body in enumerate(ends.values()):
         depths.append(float(body.reach_placed(down)[0]))
-        depths += [penetration(body, other) for other in bodies[k + 1 :]]
+        depths += [
+            penetration(body, other)
+            for other in bodies[k + 1 :]
+            if not scene.kept_apart(f"body/{body.name}", f"body/{other.name}")
+        ]
     return max(depths)
 
 

@@ -15,7 +15,7 @@ from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.scene import Box, Compound, Pose, Scene, SceneError, Start
 from pytest_simbench.tasks import Jitter, Settling, rests_on
-from pytest_simbench.tasks.settling import deepest, tilted
+from pytest_simbench.tasks.settling import deepest, kinetic_energy, spread, tilted
 from tests.conftest import case_of
 
 NONE = Jitter(0.0, 0.0)
@@ -80,6 +80,23 @@ def test_what_it_cannot_do_is_one_sentence(scene: Scene, premises: list[Any], me
         Settling(scene, premises)
 
 
+def test_energy_is_that_of_motion_and_of_spin_about_the_body_s_own_axes() -> None:
+    box = Box("box", (0.3, 0.2, 0.1), Pose.at(0, 0, 1), 2.0, moments=(0.1, 0.2, 0.25))
+    turned = np.sqrt(0.5) * np.array([1.0, 0.0, 0.0, 1.0])  # its x axis is the world's y
+    rows = np.array([[0, 0, 1, *turned, 3.0, 0, 0, 0, 4.0, 0], [0, 0, 1, *turned, *[0.0] * 6]])
+    both = (2.0 * 3.0**2 + 0.1 * 4.0**2) / 2
+    assert kinetic_energy(Scene("s", (box,)), rows[:, None]) == pytest.approx(both / 2)
+
+
+def test_the_spread_of_forces_is_of_the_weight() -> None:
+    box = Box("box", (0.1,) * 3, Pose.at(0, 0, 1), 2.0)
+    scene, pair = Scene("s", (box,), gravity=(0.0, 0.0, -10.0)), ("body/box", "ground")
+    looks = [{pair: np.array([0, 0, force, 0, 0, 0])} for force in (19.0, 21.0)]
+    assert spread(scene, looks) == pytest.approx(5.0)
+    assert spread(scene, [{}, {pair: np.array([0, 0, 2.0, 0, 0, 0])}]) == pytest.approx(5.0)
+    assert spread(scene, []) is None
+
+
 @pytest.mark.engine
 def test_a_stool_rests_on_a_slab_and_a_premise_that_fails_says_so(case: Case) -> None:
     premises = [rests_on("stool", "slab"), rests_on("slab", "stool")]
@@ -92,4 +109,6 @@ def test_a_stool_rests_on_a_slab_and_a_premise_that_fails_says_so(case: Case) ->
     assert record.metrics["farthest"] == pytest.approx(10.0, abs=1.0)
     assert record.metrics["tilt"] < 1.0
     assert record.metrics["restless"] < 1.0
+    assert record.metrics["energy"] < 1.0
+    assert 0.0 < record.metrics["force_jitter"] < 1.0
     assert record.details["places"]["stool"][2] == pytest.approx(0.15 - 0.05, abs=1e-3)
