@@ -91,6 +91,8 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
     own = {f"body/{body.name}/damping" for body in scene.free_bodies if body.damping.any()}
     joints = () if scene.robot is None else scene.robot.joints
     own |= {f"joint/{joint.name}/friction" for joint in joints if joint.friction}
+    motors = [joint.name for joint in joints if joint.motor]
+    own |= {f"joint/{name}/{gain}" for name in motors for gain in ("stiffness", "damping")}
     for pattern, value in settings.quantities().items():
         meant = {name for name in quantities if fnmatchcase(name, pattern)}
         quantities |= dict.fromkeys(meant - own, value)

@@ -76,6 +76,11 @@ class Joint(Wire):
         check_number(self.initial_position, f"the initial position of joint {self.name!r}")
         check_number(self.rest, f"the rest position of the spring in joint {self.name!r}")
 
+    @property
+    def motor(self) -> bool:
+        """Whether its drive pushes the commanded effort alone: tau = clip(tau_ff, +-limit)."""
+        return self.stiffness <= FREE < self.effort_limit and not self.damping
+
 
 @dataclass(frozen=True)
 class Gripper(Wire):

@@ -39,12 +39,14 @@ class Start(Wire):
         poses: of each, in the frame that its file gives it (`Compound.file_frame`).
         positions: of the robot's joints [rad or m]; empty: as the scene has them.
         targets: what its drives are told there; empty: the positions.
+        efforts: what they are told in addition [N m or N]; empty: none.
     """
 
     bodies: tuple[str, ...]
     poses: tuple[Pose, ...]
     positions: tuple[float, ...] = ()
     targets: tuple[float, ...] = ()
+    efforts: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,7 @@ class Scene(Wire):
         """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `compound`,
         `file` (read from one), `frictions` (several), `restitution`, `damping`, `wrench`,
         `prescribed`, `loop`, `self_collide`, `apart`, and of joints `coupling`, `passive_damping`,
-        `joint_friction`, `spring`."""
+        `joint_friction`, `spring`, `motor`."""
         bodies = self.bodies
         joints = () if self.robot is None else self.robot.joints
         found = {
@@ -183,6 +185,7 @@ class Scene(Wire):
             "passive_damping": any(joint.passive_damping for joint in joints),
             "joint_friction": any(joint.friction for joint in joints),
             "spring": any(joint.spring for joint in joints),
+            "motor": any(joint.motor for joint in joints),
         }
         kinds = {part.kind for body in bodies for part in (body, *body.parts)}
         return frozenset(kinds | {word for word, there in found.items() if there})

@@ -19,6 +19,7 @@ from pytest_simbench.scene import (
     Pose,
     Robot,
     Scene,
+    Trajectory,
     Vector3,
 )
 from pytest_simbench.simulator import Capability
@@ -79,22 +80,34 @@ def declared(subject: Subject, word: str) -> None:
             pytest.skip(deviation.reason)
 
 
-def moves(subject: Subject, robot: Robot) -> tuple[FloatArray, FloatArray]:
-    """Times, (n,) [s], and positions of the joints, (n, n_joints), of what nobody drives."""
+def moves(
+    subject: Subject, robot: Robot, effort: float | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Times, (n,) [s], and positions of the joints, (n, n_joints), of what nobody drives, or of
+    what is told an effort for one step and then no more [N m or N]."""
     with subject.world(Scene(robot.name, robot=robot)) as world:
+        if effort is not None:
+            rest = np.zeros(len(robot.joints))
+            world.follow(Trajectory.holding(subject.timestep, rest, rest + effort))
         motion = logged(world.wait(SECONDS, log_period=0.01))
     return motion.time, motion.joints[:, 0]
 
 
 def moves_by(
-    subject: Subject, *parts: Part, law: Acceleration, rotor: float = 0.0, **held: Any
+    subject: Subject,
+    *parts: Part,
+    law: Acceleration,
+    rotor: float = 0.0,
+    told: float | None = None,
+    **held: Any,
 ) -> FloatArray:
     """The first part moves as the law says, within 2 % of its way and two steps' travel; positions
-    of all, (n, n_parts). `rotor`: armature of that part's joint; `held`: see `mechanism`."""
+    of all, (n, n_parts). `rotor`: armature of that part's joint; `told`: effort [N m or N];
+    `held`: see `mechanism`."""
     robot, part = mechanism(parts[0].name, *parts, **held), parts[0]
     if rotor:
         robot = scenes.with_joint(robot, part.name, armature=rotor)
-    time, positions = moves(subject, robot)
+    time, positions = moves(subject, robot, told)
     right = followed(law, time)
     fastest = float(np.abs(np.gradient(right, time)).max())
     allowed = 0.02 * float(np.ptp(right)) + 2 * subject.timestep * fastest
@@ -105,9 +118,10 @@ def moves_by(
     return positions
 
 
-def held(subject: Subject, part: Part) -> None:
-    """What pulls less than the friction moves nothing: 2 mm or 5 mrad in half a second."""
-    _, positions = moves(subject, mechanism(part.name, part))
+def held(subject: Subject, part: Part, told: float | None = None) -> None:
+    """What pulls less than the friction, or as much as a motor that is told an effort [N m or N],
+    moves nothing: 2 mm or 5 mrad in half a second."""
+    _, positions = moves(subject, mechanism(part.name, part), told)
     way, unit = (2e-3, "m") if part.slides else (5e-3, "rad")
     require_close(f"creep of {part.name}", float(np.abs(positions).max()), 0.0, way, unit)
 
@@ -199,6 +213,26 @@ def rotors_are_heavy(subject: Subject) -> None:
         if deviation.excuses(f"joint/{part.name}/armature"):
             pytest.skip(deviation.reason)
     moves_by(subject, part, law=lambda q, v: -G / 2, rotor=MASS)
+
+
+@check()
+def motors_push(subject: Subject) -> None:
+    """A mass on a slider, with a motor (a drive without stiffness and damping): told an effort as
+    large as its weight it stays, told half of that it falls half as fast, told ten times that it
+    rises with what the effort limit, 1.5 times the weight, leaves: half of g. A lever likewise, but
+    for the last; a motor that is told nothing lets it fall."""
+    declared(subject, "motor")
+    weight, torque = MASS * G, MASS * G * LEVER
+    strong = slider("motor", effort=STRONG)
+    held(subject, strong, weight)
+    moves_by(subject, strong, law=lambda q, v: -G / 2, told=weight / 2)
+    weak = slider("weak motor", effort=1.5 * weight)
+    moves_by(subject, weak, law=lambda q, v: G / 2, told=10 * weight)
+    joint = lever("motor of a lever", effort=STRONG)
+    held(subject, joint, -torque)
+    moves_by(subject, joint, law=lambda q, v: turning(q) / ABOUT_AXIS)
+    half = -torque / 2
+    moves_by(subject, joint, law=lambda q, v: (turning(q) + half) / ABOUT_AXIS, told=half)
 
 
 @check(Capability.APART)

@@ -6,7 +6,7 @@ solved together with the contacts. Each step they are told the velocity v* + `po
 other drive, spring and damper with a rest position, is implicit too but knows no effort limit,
 and contact impulses do not feel its damping: at rest against a contact only m / (m + timestep d)
 of the spring's force arrives, a quarter for a finger. So it is no drive, and only what joints have
-of their own.
+of their own. A joint that has a motor alone (`scene.Joint`) is of DART's kind `FORCE`.
 
 What was learnt stands in docs/engines/dart.md.
 """
@@ -177,7 +177,8 @@ class DART(Simulator):
             if drive.name in followers:
                 limit *= 2
             else:
-                joint.setActuatorType(dynamics.ActuatorType.SERVO)
+                kinds = dynamics.ActuatorType
+                joint.setActuatorType(kinds.FORCE if drive.motor else kinds.SERVO)
             joint.setDampingCoefficient(0, drive.passive_damping)
             joint.setCoulombFriction(0, drive.friction)
             joint.setSpringStiffness(0, drive.spring)
@@ -189,7 +190,8 @@ class DART(Simulator):
             joint.setVelocityLowerLimit(0, -np.inf)
         names = [skeleton.getDof(i).getName() for i in range(skeleton.getNumDofs())]
         self._index = np.array([names.index(name) for name in robot.joint_names])
-        driven = np.array([name not in followers for name in robot.joint_names])
+        self._motors = np.array([joint.motor for joint in robot.joints])
+        driven = np.array([name not in followers for name in robot.joint_names]) & ~self._motors
         self._gain = driven * (self.settings.position_gain / self.settings.timestep)
         self._share = driven * (1 - self.settings.position_gain)
         if robot.couplings:
@@ -210,9 +212,9 @@ class DART(Simulator):
         return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
-        # Servo motors find the effort themselves, so there is nothing to feed forward.
+        # Servo motors find the effort themselves. DART clips what it is told of the kind `FORCE`.
         base = np.zeros(len(self._index))
-        base[self._index] = self._gain * position + self._share * velocity
+        base[self._index] = self._gain * position + self._share * velocity + self._motors * effort
         self._base = base
 
     def push(self, wrenches: FloatArray) -> None:

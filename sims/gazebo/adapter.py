@@ -80,6 +80,11 @@ class Gazebo(Simulator):
                 "the adapter gives joints no springs: SDF's were not tried",
                 only="spring",
             ),
+            Deviation(
+                "joint/*/stiffness",
+                "the adapter commands velocities: it holds what has a motor alone",
+                only="motor",
+            ),
             Deviation("body/*/margin", "Gazebo's boxes and round shapes have no margin outside"),
             Deviation(
                 "link/*/margin",

@@ -1,8 +1,8 @@
 """What the actuators of a file's joint do, as one drive of the scene.
 
 A plain actuator on a joint pulls with gear (gain u + b0 + b1 gear q + b2 gear v), u its control. So
-several of them are one spring and damper again. Without a command a drive holds its joint where it
-starts, and a motor does nothing.
+several of them are one spring and damper again, or a motor (`scene.Joint`). Without a command a
+drive holds its joint where it starts, and a motor does nothing.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pytest_simbench.description.carried import APPROXIMATED, NOT_CARRIED
+from pytest_simbench.description.carried import APPROXIMATED, CARRIED
 from pytest_simbench.scene import FloatArray
 from pytest_simbench.simulator import lazy_import
 
@@ -50,10 +50,16 @@ class Drive:
     def target(self, controls: FloatArray) -> float | None:
         """Where it holds the joint, from where the file is written, with the controls of a
         keyframe, (nu,) [rad or m]; None: it holds it nowhere."""
-        if not self.stiffness:
-            return None
-        pull = self.gears @ (self.gains * controls[self.numbers] + self.constants)
-        return float(pull / self.stiffness) - self.zero
+        return self._pull(controls) / self.stiffness - self.zero if self.stiffness else None
+
+    def effort(self, controls: FloatArray) -> float:
+        """What it is told beside that: of a motor its effort, of what has damping alone that with
+        which it moves as fast as the controls ask [N m or N]."""
+        return 0.0 if self.stiffness else self._pull(controls)
+
+    def _pull(self, controls: FloatArray) -> float:
+        """With the joint at rest at 0."""
+        return float(self.gears @ (self.gains * controls[self.numbers] + self.constants))
 
     def controls(self, target: float) -> FloatArray:
         """The controls, (n,), with which it holds the joint there, from where the file is written
@@ -75,9 +81,13 @@ def drive_of(reading: Reading, joint: int) -> Drive:
     if stiffness < 0 or damping < 0 or (stiffness and not np.any(gains * gears)):
         plain = plain[:0]  # what drives a joint away from where it is, or cannot be commanded
         gears, gains, constants, stiffness, damping = plain, plain, plain, 0.0, 0.0
-    limited = model.actuator_forcelimited[plain].astype(bool)
-    ranges = np.abs(model.actuator_forcerange[plain]).min(axis=1) * np.abs(gears)
-    limit = float(ranges.sum()) if len(plain) and limited.all() else STRONG
+    limits = np.abs(model.actuator_forcerange[plain]).min(axis=1) * np.abs(gears)
+    limits = np.where(model.actuator_forcelimited[plain], limits, STRONG)
+    if not stiffness and not damping:  # controls of motors are efforts, and have limits too
+        most = np.abs(gains) * np.abs(model.actuator_ctrlrange[plain]).max(axis=1)
+        most = (most + np.abs(constants)) * np.abs(gears)
+        limits = np.where(model.actuator_ctrllimited[plain], np.minimum(limits, most), limits)
+    limit = float(limits.sum()) if len(plain) else STRONG
     zero = float(model.qpos0[model.jnt_qposadr[joint]])
     made = Drive(plain, gears, gains, constants, zero, stiffness, damping, min(limit, STRONG))
     names = [reading.name("actuator", int(k)) for k in plain]
@@ -88,8 +98,11 @@ def drive_of(reading: Reading, joint: int) -> Drive:
         reason = f"it holds its joint at rest, by at most {made.limit:g} N m or N"
         reading.tell("actuator (velocity)", APPROXIMATED, reason, names)
     elif names:
-        reason = "nothing commands it here; without a command it does nothing in the file, either"
-        reading.tell("actuator (motor)", NOT_CARRIED, reason, names)
+        pull = made.effort(np.zeros(model.nu))
+        reason = f"a drive that is told an effort of at most {made.limit:g} N m or N; without a "
+        reason += "command it does nothing"
+        reason += f" here, and pulls {pull:g} in the file" if pull else ", here and in the file"
+        reading.tell("actuator (motor)", APPROXIMATED if pull else CARRIED, reason, names)
     return made
 
 

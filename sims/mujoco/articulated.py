@@ -232,7 +232,7 @@ class Tree:
             link.told,
             max(drive.stiffness, FREE),
             drive.damping,
-            drive.limit if drive.stiffness or drive.damping else FREE,
+            drive.limit if len(drive.numbers) else FREE,
             float(model.dof_armature[dof]),
             min(max(0.0, limits[0]), limits[1]),
             passive_damping=float(np.ravel(model.dof_damping[dof])[0]),

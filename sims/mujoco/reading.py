@@ -421,7 +421,9 @@ class Reading:
         positions = np.clip(qpos[at] - model.qpos0[at], *limits.T).tolist()
         held = [drive.target(model.key_ctrl[key]) for drive in self.tree.drives]
         targets = [q if t is None else t for q, t in zip(positions, held, strict=True)]
-        return Start(tuple(names), tuple(poses), tuple(positions), tuple(targets))
+        efforts = [drive.effort(model.key_ctrl[key]) for drive in self.tree.drives]
+        told = (positions, targets, efforts if any(efforts) else ())
+        return Start(tuple(names), tuple(poses), *map(tuple, told))
 
 
 def _pose(place: Any, quaternion: Any) -> Pose:

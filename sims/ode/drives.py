@@ -6,7 +6,8 @@ bounded by FMax. What it does follows from Vel and CFM:
 - `spring`: with Vel = (k (q* - q) + d v* + tau_ff) / (h k + d) and CFM = 1 / (h k + d) the effort
   is k (q* - q - h v) + d (v* - v) + tau_ff at the velocity v after the step h: the scene's drive
   law, implicit, and clipped to the limit within the solver.
-- `velocity`: Vel = P (q* - q), what Webots does with its motors; CFM is the world's.
+- `velocity`: Vel = P (q* - q), what Webots does with its motors; CFM is the world's. A joint that
+  has a motor alone (`scene.Joint`) obeys the drive law here too.
 - at a stop ODE does not put the motor into the solver: it pushes with all of FMax, whatever Vel is.
   A drawer of 1.4 kg that begins at its stop left with 15 m/s, of a motor that brakes with at most
   10 kN. So at a stop FMax is, for that step, what the law asks for, of joints that are neither
@@ -233,9 +234,12 @@ def _law(
         Shares of position, velocity and effort in Vel, (3, n_joints), and CFM of each motor, None
         for the world's.
     """
-    n = len(robot.joints)
-    if drive == "velocity":
-        return np.outer([position_gain, 0.0, 0.0], np.ones(n)), [None] * n
     stiffness, damping = robot.column("stiffness"), robot.column("damping")
     resistance = np.maximum(timestep * stiffness + damping, WEAKEST)
-    return np.stack([stiffness, damping, np.ones(n)]) / resistance, (1 / resistance).tolist()
+    shares = np.stack([stiffness, damping, np.ones(len(resistance))]) / resistance
+    softness = (1 / resistance).tolist()
+    if drive == "velocity":
+        held = [k for k, joint in enumerate(robot.joints) if not joint.motor]
+        shares[:, held] = [[position_gain], [0.0], [0.0]]
+        softness = [None if k in held else soft for k, soft in enumerate(softness)]
+    return shares, softness

@@ -3,7 +3,8 @@
 Drives are Bullet's own position motors: velocity constraints that ask, each step, for the velocity
 `velocityGain` (v* - v) + v* + `positionGain` (q* - q) / timestep, with the effort limit as largest
 force. They are not springs: there is no stiffness in N m/rad, and no effort feed-forward, which
-they do not need. The fingers' effort limit is the grip's squeeze. What joints do beside: joints.py.
+they do not need. The fingers' effort limit is the grip's squeeze. What joints do beside, and those
+that have a motor alone (`scene.Joint`): joints.py.
 
 What was learnt stands in docs/engines/pybullet.md.
 """
@@ -33,7 +34,7 @@ from pytest_simbench.simulator import (
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from .anchors import Anchors
-from .joints import Passive, couple, rub
+from .joints import Pushed, couple, rub
 from .readback import ReadBack, wrench
 from .settings import CHOSEN_ON, PROFILES, PyBulletSettings
 from .world import ROBOT, WORLD, add_body, close_loop, set_surface
@@ -140,7 +141,7 @@ class PyBullet(Simulator):
         self._part_from_still(scene)
         self._robot = -1
         self._anchors: Anchors | None = None
-        self._passive: Passive | None = None
+        self._pushed: Pushed | None = None
         self._couplings: list[int] = []
         self._closures: list[int] = []
         self._joints: list[int] = []
@@ -213,14 +214,14 @@ class PyBullet(Simulator):
             for joint in robot.joints
             if joint.friction
         ]
-        if any(joint.spring or joint.passive_damping for joint in robot.joints):
+        if any(joint.spring or joint.passive_damping or joint.motor for joint in robot.joints):
             step = self.settings.timestep
-            self._passive = Passive(c, self._robot, self._joints, robot, step)
+            self._pushed = Pushed(c, self._robot, self._joints, robot, step)
         self._closures = [
             close_loop(c, self._robot, self._links, closure) for closure in reduced(prepared)
         ]
         n = len(self._joints)
-        self._forces = list(robot.column("effort_limit"))
+        self._forces = [0.0 if joint.motor else joint.effort_limit for joint in robot.joints]
         self._gains = ([self.settings.position_gain] * n, [self.settings.velocity_gain] * n)
         self.command(robot.column("initial_position"), np.zeros(n), np.zeros(n))
 
@@ -229,6 +230,8 @@ class PyBullet(Simulator):
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         self._commanded = (position, velocity, effort)
+        if self._pushed is not None:
+            self._pushed.command(effort)
         pybullet.setJointMotorControlArray(
             self._robot,
             self._joints,
@@ -257,8 +260,8 @@ class PyBullet(Simulator):
             pybullet.resetBaseVelocity(body, row[7:10] - falls, row[10:], c)
 
     def step(self) -> None:
-        if self._passive is not None:
-            self._passive.push()
+        if self._pushed is not None:
+            self._pushed.push()
         if self._anchors is None:
             pybullet.stepSimulation(self.client)
         else:
@@ -284,7 +287,7 @@ class PyBullet(Simulator):
     def save(self) -> tuple[Any, ...]:
         anchors = self._anchors.save() if self._anchors else None
         made = pybullet.saveState(physicsClientId=self.client)
-        pushed = self._passive.last if self._passive else None
+        pushed = self._pushed.last if self._pushed else None
         return made, self._steps, self._commanded, anchors, pushed
 
     def restore(self, state: tuple[Any, ...]) -> None:
@@ -292,8 +295,8 @@ class PyBullet(Simulator):
         pybullet.restoreState(stateId=made, physicsClientId=self.client)
         if self._anchors is not None and anchors is not None:
             self._anchors.restore(anchors)
-        if self._passive is not None:
-            self._passive.last = pushed
+        if self._pushed is not None:
+            self._pushed.last = pushed
         if commanded is not None:  # motor targets are not part of Bullet's state
             self.command(*commanded)
 

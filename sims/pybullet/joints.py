@@ -1,5 +1,5 @@
-"""What Bullet's joints do beside their motors: those that move together, friction, and efforts of
-springs and dampers.
+"""What Bullet's joints do beside Bullet's own motors: those that move together, friction, and
+efforts of springs, dampers and the scene's motors.
 
 Bullet's own dampers push by the speed before a step: one that would stop its joint in less than
 half a step throws it. So the adapter asks Bullet for masses and loads, and pushes once a step.
@@ -53,36 +53,42 @@ def gears(client: int, constraints: list[int]) -> dict[tuple[int, int], tuple[fl
     return found
 
 
-class Passive:
-    """Springs and dampers of the joints, pushed by the adapter.
+class Pushed:
+    """Springs, dampers and motors of the joints, pushed by the adapter.
 
     Pushed by the present state, tau = k (rest - q) - d v, light joints would be thrown. So it is
     tau - (dt d + dt^2 k / 4) a, with the acceleration a that the joints are about to have: stable
     for all k and d (of d as in the implicit Euler method, of k as in Newmark's, which takes no
-    energy). What motors and contacts do to a is taken from the last step, so that a joint that they
-    hold feels all of its spring.
+    energy). What Bullet's motors and contacts do to a is taken from the last step, so that a joint
+    that they hold feels all of its spring.
 
     Args:
         client, robot: Bullet's numbers.
         joints: of all joints that move.
-        described: has their springs and dampers, in the same order.
+        described: has their springs, dampers and motors, in the same order.
         timestep: dt [s].
 
     Attributes:
-        last: of the last step: masses, velocities, and efforts but those of motors and contacts.
+        last: of the last step: masses, velocities, and efforts but those of Bullet's motors and of
+            contacts.
     """
 
     def __init__(
         self, client: int, robot: int, joints: list[int], described: Robot, timestep: float
     ) -> None:
-        order = np.argsort(joints)  # that of Bullet's mass matrix
+        self._order = order = np.argsort(joints)  # that of Bullet's mass matrix
         self._client, self._robot, self._timestep = client, robot, timestep
         self._joints = [joints[k] for k in order]
         self._k, self._rest, self._d = (
             described.column(name)[order] for name in ("spring", "rest", "passive_damping")
         )
+        self._most = np.array([j.effort_limit if j.motor else 0.0 for j in described.joints])
         self._held = timestep * self._d + timestep**2 / 4 * self._k
         self.last: tuple[FloatArray, FloatArray, FloatArray] | None = None
+
+    def command(self, effort: FloatArray) -> None:
+        """What the motors push from now on."""
+        self._told = np.clip(effort, -self._most, self._most)[self._order]
 
     def push(self) -> None:
         """For the next step."""
@@ -91,7 +97,7 @@ class Passive:
         q, v = [state[0] for state in states], np.array([state[1] for state in states])
         load = pybullet.calculateInverseDynamics(robot, q, v.tolist(), [0.0] * len(q), **c)
         mass = np.array(pybullet.calculateMassMatrix(robot, q, **c))
-        effort = self._k * (self._rest - q) - self._d * v
+        effort = self._told + self._k * (self._rest - q) - self._d * v
         free = effort - load
         if self.last is not None:
             before, speeds, known = self.last

@@ -240,12 +240,55 @@ def test_several_actuators_of_a_joint_are_one_drive(kitchen: Path) -> None:
     assert (joint.stiffness, joint.damping, joint.passive_damping) == (200.0, 3.0, 2.0)
 
 
+MOTOR = '<motor joint="slide" gear="-20" {}/><position name'
+
+
+@pytest.mark.parametrize(
+    ("limits", "most"),
+    [
+        ("", 1e4),
+        ('forcerange="-3 3"', 60.0),
+        ('ctrlrange="-.4 .4"', 8.0),
+        ('ctrlrange="-.4 .4" forcerange="-.1 .1"', 2.0),
+    ],
+)
+def test_motors_are_drives_that_are_told_efforts(kitchen: Path, limits: str, most: float) -> None:
+    reading = changed(kitchen, "<position name", MOTOR.format(limits))
+    joint = reading.scene.robot.joints[0]
+    assert joint.motor
+    assert joint.effort_limit == pytest.approx(most)
+    (line,) = (line for line in reading.account if line.quantity == "actuator (motor)")
+    assert line.state == "carried"
+    assert f"at most {most:g} N" in line.reason
+    assert "actuator" not in {other.quantity for other in reading.account}
+
+
+def test_a_motor_that_pulls_without_a_command_is_not_as_in_the_file(kitchen: Path) -> None:
+    pulling = '<general joint="slide" gear="2" biastype="affine" biasprm="3 0 0"/><position name'
+    reading = changed(kitchen, "<position name", pulling)
+    (line,) = (line for line in reading.account if line.quantity == "actuator (motor)")
+    assert (line.state, "pulls 6 in the file" in line.reason) == ("approximated", True)
+
+
+def test_a_keyframe_tells_motors_and_velocity_servos_their_efforts(kitchen: Path) -> None:
+    text = KITCHEN.replace(
+        "</actuator>",
+        '<motor joint="slide" gear="-20"/><velocity joint="shoulder" kv="3" gear="2"/></actuator>'
+        '<keyframe><key ctrl=".4 .1 .5"/></keyframe>',
+    )
+    kitchen.write_text(text)
+    (start,) = Reading(str(kitchen)).scene.starts
+    assert start.efforts == pytest.approx((-2.0, 3.0, 0.0))
+    assert start.targets == pytest.approx((0.0, 0.0, 0.4))
+
+
 def test_a_keyframe_has_joints_and_what_their_drives_are_told(kitchen: Path) -> None:
     pose = "0 0 .5 1 0 0 0"
     key = f'</actuator><keyframe><key qpos=".1 2 -.3 {pose}" ctrl=".4"/></keyframe>'
     (start,) = changed(kitchen, "</actuator>", key).scene.starts
     assert start.positions == pytest.approx((0.1, 2.0, -0.3))
     assert start.targets == pytest.approx((0.1, 2.0, 0.4))
+    assert start.efforts == ()
     assert start.poses[0].position == (0.0, 0.0, 0.5)
 
 
