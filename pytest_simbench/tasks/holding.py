@@ -54,15 +54,18 @@ class Holding(OnJoints):
     def parameters(self) -> dict[str, Any]:
         return super().parameters() | {"task.seconds": self.seconds}
 
-    def targets(self, seed: int) -> FloatArray:
-        """What the drives are told, (n_joints,) [rad or m]."""
+    def commands(self, seed: int) -> tuple[FloatArray, FloatArray]:
+        """What the drives are told: positions, (n_joints,) [rad or m], and efforts [N m or N]."""
         start = self.start(seed)
-        written = tuple(self.robot.column("initial_position"))
-        return np.array(written if start is None else start.targets or start.positions or written)
+        written, none = self.robot.column("initial_position"), np.zeros(len(self.joints))
+        if start is None:
+            return written, none
+        targets = start.targets or start.positions
+        return (np.array(targets) if targets else written), np.array(start.efforts or none)
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        before, targets = world.joints[0], self.targets(seed)
-        world.follow(Trajectory.holding(LOG_PERIOD, targets))
+        before, (targets, efforts) = world.joints[0], self.commands(seed)
+        world.follow(Trajectory.holding(LOG_PERIOD, targets, efforts))
         rest = self.rest(world, self.seconds, "hold")
         gone = world.joints[0] - before
         metrics = self.by_kind("gone", np.abs(gone))

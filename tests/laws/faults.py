@@ -30,7 +30,7 @@ def rougher(factor: float) -> Fault:
         def of(mu: float) -> float:
             return factor * mu or 0.2
 
-        bodies = tuple(replace(body, friction=of(body.friction)) for body in scene.bodies)
+        bodies = tuple(body.with_friction(of(body.friction)) for body in scene.bodies)
         robot = scene.robot and replace(scene.robot, friction=of(scene.robot.friction))
         ground = of(scene.ground_friction)
         return replace(scene, bodies=bodies, robot=robot, ground_friction=ground)

@@ -24,7 +24,7 @@ def test_a_motor_is_a_drive_without_stiffness_and_damping() -> None:
     assert "motor" in Scene("both", robot=ROBOT).words
 
 
-@pytest.mark.parametrize("name", ["mujoco", "pybullet", "dart"])
+@pytest.mark.parametrize("name", ["mujoco", "pybullet", "dart", "sapien"])
 def test_a_motor_pushes_beside_a_drive(name: str) -> None:
     """Up to its limit, until the next command, also after a state was restored; the drive holds,
     and the joint's wrench is what the motor pushes."""

@@ -57,9 +57,12 @@ def test_drives_are_told_the_keyframe_s_targets() -> None:
         Start((), ()),
     )
     task = Holding(replace(SCENE, starts=starts))
-    told = [task.targets(seed).tolist() for seed in range(4)]
+    told = [task.commands(seed)[0].tolist() for seed in range(4)]
     assert told == [[0.3, 0.4], [0.1, 0.2], [0.0, 0.05], [0.3, 0.4]]
-    assert Holding(SCENE).targets(7).tolist() == [0.0, 0.05]
+    position, effort = Holding(SCENE).commands(7)
+    assert (position.tolist(), effort.tolist()) == ([0.0, 0.05], [0.0, 0.0])
+    pushed = Holding(replace(SCENE, starts=(Start((), (), efforts=(0.0, 3.0)),)))
+    assert pushed.commands(0)[1].tolist() == [0.0, 3.0]
 
 
 def test_joints_are_measured_by_kind_each_in_its_unit() -> None:
