@@ -10,7 +10,6 @@ What was learnt stands in docs/engines/mujoco.md.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ from pytest_simbench.simulator import (
 )
 
 from .bounces import BOUNCES
-from .own_file import FileReadBack, OwnFile
+from .own_file import FILE_MOVES, FileReadBack, OwnFile, of_file
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from .reading import Reading
@@ -94,8 +93,7 @@ class MuJoCo(Simulator):
         self.model, self.data = own.model, own.data
         self._q = self._v = np.array([], dtype=int)
         self._body_ids = own.roots
-        deviations = (*self.info.deviations, *own.deviations())
-        vars(self)["info"] = replace(self.info, deviations=deviations)  # of this world alone
+        vars(self)["info"] = of_file(self.info, own.deviations())  # of this world alone
 
     def _build(self, scene: Scene) -> None:
         self.model = model = build(scene, self.prepared, self.settings)
@@ -152,10 +150,7 @@ class MuJoCo(Simulator):
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         if self._own_file is not None:
-            raise NotSupportedError(
-                "in the profile `file` the file's own actuators move its joints; choose another "
-                "profile for motions"
-            )
+            raise NotSupportedError(FILE_MOVES)
         self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
 
     def push(self, wrenches: FloatArray) -> None:

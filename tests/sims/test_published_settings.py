@@ -24,7 +24,12 @@ PUBLISHED = {
         "real": "851260d7",
         "file": "aeed4602",
     },
-    "newton": {"default": "f383bffb", "tuned": "a5b7dbbe", "real": "b00c1176"},
+    "newton": {
+        "default": "f383bffb",
+        "tuned": "a5b7dbbe",
+        "real": "b00c1176",
+        "file": "aeed4602",
+    },
     "ode": {"default": "f1f2c655", "tuned": "7c840eea", "real": "85bf7f2e"},
     "ovphysx": {"default": "0791bbcb", "tuned": "d65af419", "real": "e9c2722b"},
     "pybullet": {"default": "4aa77342", "tuned": "aae95f40", "real": "4c560c5f"},
