@@ -16,7 +16,7 @@ from pytest_simbench.scene import Body, Box, Capsule, Compound, ConvexMesh, Cyli
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
-from .settings import GenesisSettings
+from .settings import GenesisFileSettings, GenesisSettings
 
 genesis = lazy_import("genesis")
 
@@ -31,7 +31,8 @@ def new_world(scene: Scene, settings: GenesisSettings, *, window: bool) -> Any:
         sim_options=options.SimOptions(dt=s.timestep, substeps=s.substeps, gravity=scene.gravity),
         rigid_options=options.RigidOptions(
             # of a robot, but for links that a joint joins; boxes are entities of their own
-            enable_self_collision="self_collide" in scene.words,
+            enable_self_collision="self_collide" in scene.words
+            or isinstance(s, GenesisFileSettings),
             integrator=getattr(genesis.integrator, s.integrator),
             friction_cone=getattr(genesis.friction_cone, s.friction_cone),
             impratio=s.impratio or None,

@@ -17,7 +17,12 @@ PUBLISHED = {
     "dart": {"default": "66deefbc", "tuned": "a4fc61ec", "real": "a4fc61ec"},
     "drake": {"default": "09441a8f", "tuned": "cf3c33e5", "real": "d8e9fec8"},
     "gazebo": {"default": "3def4e2e", "tuned": "93d12aae"},
-    "genesis": {"default": "de5dd03b", "tuned": "22a5088c", "real": "22a5088c"},
+    "genesis": {
+        "default": "de5dd03b",
+        "tuned": "22a5088c",
+        "real": "22a5088c",
+        "file": "aa91ebd9",
+    },
     "mujoco": {
         "default": "547fd8a1",
         "tuned": "e78c49da",
