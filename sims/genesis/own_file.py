@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.carried import named
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
 
-from ..mujoco.account import values_of
+from ..mujoco.imported import Told, compared, deviations, pairs
 from ..mujoco.own_file import OwnFile
 from ..mujoco.touching import collide
 from .engine import array_of, contact_parameters, numbers, of_collider
@@ -39,9 +38,6 @@ EXCUSED = {
     "collision": "body/*/touches ground/touches",
 }
 """Quantities of the parity check that a difference excuses."""
-
-CLOSE = 1e-5
-"""Share by which values may differ: the engine is of single precision."""
 
 
 @dataclass(frozen=True)
@@ -153,13 +149,10 @@ class GenesisFile:
 
     def deviations(self) -> tuple[Deviation, ...]:
         """As `OwnFile`, and what the importer did not keep."""
-        excused = " ".join(EXCUSED[what] for what, _ in self._told if what in EXCUSED)
-        told = [Deviation("", f"Genesis' importer: {sentence}") for _, sentence in self._told]
-        if excused:
-            told.append(Deviation(excused, "as Genesis' importer has it"))
+        told = deviations("Genesis' importer", self._told, EXCUSED)
         return Deviation("", NOT_READ), *told, *self.file.deviations()
 
-    def _differences(self) -> Iterator[tuple[str, str]]:
+    def _differences(self) -> Iterator[Told]:
         """What the importer did not keep of a file, and the sentence about it."""
         own, model, solver, solid = self.own, self.own.model, self.solver, self.solid
         roots = [body for body in range(1, model.nbody) if model.body_dofnum[body]]
@@ -170,7 +163,7 @@ class GenesisFile:
         geoms, masses = self.entity.geoms, [float(link.get_mass()) for link in self.links]
         soft = np.hstack([model.geom_solref, model.geom_solimp])[solid]
         springs = np.reshape(model.jnt_stiffness, (model.njnt, -1))[:, 0]
-        ask, pairs = self._pairs()
+        ask, both = pairs(own, solid)
         meet = collide(own, solid)[ask]
         for what, made, asked, names in (
             ("body mass", of_root @ masses, of_root @ model.body_mass, bodies),
@@ -180,22 +173,9 @@ class GenesisFile:
             ("joint damping", solver.get_dofs_damping(), model.dof_damping, joints),
             ("joint frictionloss", solver.get_dofs_frictionloss(), model.dof_frictionloss, joints),
             ("joint stiffness", solver.get_dofs_stiffness(), springs[model.dof_jntid], joints),
-            ("collision", self._meet()[ask], meet, pairs),
+            ("collision", self._meet()[ask], meet, both),
         ):
-            found = np.array(numbers(made)).reshape(len(names), -1)
-            wanted = np.reshape(asked, (len(names), -1))
-            rows: Any = ~np.isclose(found, wanted, rtol=CLOSE, atol=0).all(axis=1)
-            if rows.any():
-                where = named(dict.fromkeys(n for n, off in zip(names, rows, strict=True) if off))
-                there = f"{values_of(found[rows])}, in the file {values_of(wanted[rows])}"
-                yield what, f"{what} is {there} ({where})"
-
-    def _pairs(self) -> tuple[Any, list[str]]:
-        """Which two shapes are asked about, of which one moves, and the names of their bodies."""
-        still = np.array([not self.own.root_of(geom) for geom in self.solid], dtype=bool)
-        ask = np.triu(np.ones((len(still),) * 2, dtype=bool)) & ~np.outer(still, still)
-        owners = [self.own.name("body", int(self.own.model.geom_bodyid[g])) for g in self.solid]
-        return ask, [f"{owners[a]} and {owners[b]}" for a, b in np.argwhere(ask)]
+            yield from compared(what, numbers(made), asked, names)
 
     def _meet(self) -> FloatArray:
         """1 for each two shapes that Genesis lets collide, else 0."""

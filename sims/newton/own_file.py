@@ -6,18 +6,17 @@ importer did not keep is found by holding that model against MuJoCo's own of the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from copy import copy
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.carried import named
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
 
-from ..mujoco.account import values_of
+from ..mujoco.imported import CLOSE, Told, compared, deviations, pairs
 from ..mujoco.own_file import OwnFile
 from ..mujoco.reading import Reading
 from ..mujoco.touching import collide
@@ -71,9 +70,6 @@ EXCUSED = {
 }
 """Quantities of the parity check that a difference excuses."""
 
-CLOSE = 2e-5
-"""Share, and of places [m], by which values may differ: Newton keeps them in single precision."""
-
 
 class NewtonFile(OwnFile):
     """The imported file, and its solver.
@@ -123,12 +119,7 @@ class NewtonFile(OwnFile):
 
     def deviations(self) -> tuple[Deviation, ...]:
         """As `OwnFile`, and what the importer did not keep."""
-        excused = " ".join(
-            dict.fromkeys(EXCUSED[what] for what, _ in self._told if what in EXCUSED)
-        )
-        told = [Deviation("", f"Newton's importer: {sentence}") for _, sentence in self._told]
-        if excused:
-            told.append(Deviation(excused, "as Newton's importer has it"))
+        told = deviations("Newton's importer", self._told, EXCUSED)
         return *told, *super().deviations()
 
 
@@ -164,13 +155,13 @@ def counterparts(own: Reading, found: Reading, labels: list[str]) -> tuple[list[
 
 def differences(
     own: Reading, found: Reading, bodies: list[int], geoms: list[int], joints: list[int]
-) -> Iterator[tuple[str, str]]:
+) -> Iterator[Told]:
     """What the importer did not keep of a file, and the sentence about it."""
     model, other = own.model, found.model
     made = _options(other)
     for name, asked in _options(model).items():
         if made[name] != asked:
-            yield told(f"option {name}", made[name], asked)
+            yield f"option {name}", f"option {name} is {made[name]}, in the file {asked}"
     solid = own.solid if own.ground is None else [*own.solid, own.ground]
     rows: dict[str, tuple[Any, Any]] = {
         "body": (range(model.nbody), bodies),
@@ -187,35 +178,18 @@ def differences(
         many, there = getattr(model, count), getattr(other, count)
         rows[kind] = (range(min(many, there)),) * 2
         if there < many:
-            yield told(f"number of {CALLED.get(kind, kind)} elements", str(there), str(many))
+            yield kind, f"{there} of {many} {CALLED.get(kind, kind)} elements are there"
     for kind, fields in FIELDS.items():
         first, second = (np.array(numbers, dtype=int) for numbers in rows[kind])
         called = rows["jnt" if kind == "dof" else kind][0]
         names = [own.name(CALLED.get(kind, kind), number) for number in called]
         for field in fields.split():
             values = _values(found, kind, field)[second], _values(own, kind, field)[first]
-            yield from _compared(f"{kind} {field}", *values, names)
+            close = CLOSE * field.startswith("x")  # places and axes
+            yield from compared(f"{kind} {field}", *values, names, close)
     meet = collide(found, rows["geom"][1]), collide(own, solid)
-    still = np.array([not own.root_of(geom) for geom in solid], dtype=bool)
-    ask = np.triu(np.ones_like(meet[0], dtype=bool)) & ~np.outer(still, still)
-    owners = [own.name("body", int(model.geom_bodyid[geom])) for geom in solid]
-    pairs = [f"{owners[a]} and {owners[b]}" for a, b in np.argwhere(ask)]
-    yield from _compared("geom contype, conaffinity", meet[0][ask], meet[1][ask], pairs)
-
-
-def told(what: str, made: str, asked: str, where: str = "") -> tuple[str, str]:
-    return what, f"{what} is {made}, in the file {asked}{where}"
-
-
-def _compared(
-    what: str, made: FloatArray, asked: FloatArray, names: Iterable[str]
-) -> Iterator[tuple[str, str]]:
-    """What is told where rows differ."""
-    near = np.isclose(made, asked, rtol=CLOSE, atol=CLOSE * (" x" in what), equal_nan=True)
-    rows = np.array([not row.all() for row in near], dtype=bool)
-    if rows.any():
-        where = dict.fromkeys(name for name, differs in zip(names, rows, strict=True) if differs)
-        yield told(what, values_of(made[rows]), values_of(asked[rows]), f" ({named(where)})")
+    ask, names = pairs(own, solid)
+    yield from compared("geom contype, conaffinity", meet[0][ask], meet[1][ask], names)
 
 
 def _options(model: Any) -> dict[str, str]:
