@@ -23,6 +23,7 @@ from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
+    NotSupportedError,
     Simulator,
     SimulatorInfo,
     heavy,
@@ -30,6 +31,7 @@ from pytest_simbench.simulator import (
 )
 
 from ..mujoco.bounces import BOUNCES, direct
+from ..mujoco.own_file import FILE_MOVES, of_file
 from .engine import (
     OLDEST,
     array_of,
@@ -42,8 +44,9 @@ from .engine import (
     start_engine,
     tensors_in,
 )
+from .own_file import FileReadBack, GenesisFile
 from .readback import ReadBack
-from .settings import CHOSEN_ON, PROFILES, GenesisSettings
+from .settings import CHOSEN_ON, PROFILES, GenesisFileSettings, GenesisSettings
 from .world import LEAST_FRICTION, add_body, add_camera, add_robot, material, new_world
 
 genesis = lazy_import("genesis")
@@ -88,8 +91,15 @@ class Genesis(Simulator):
     chosen_on = CHOSEN_ON
     settings: GenesisSettings
     world: Any = None
+    _own_file: GenesisFile | None = None
+    _robot: Any = None
     compiled: ClassVar[set[tuple[Any, ...]]] = set()
     """What this process has kernels for, see `compile`."""
+
+    def __init__(self, settings: Any, *, gui: bool = False) -> None:
+        super().__init__(settings, gui=gui)
+        if isinstance(settings, GenesisFileSettings):
+            vars(self)["info"] = of_file(self.info)
 
     def compile(self, scene: Scene) -> None:
         """Build and step such a world once; kernels depend on options and on the kinds of bodies.
@@ -123,12 +133,27 @@ class Genesis(Simulator):
         self.begin(scene)
         self._camera: Any = None
         start_engine(self.settings.precision)
-        self.world = world = new_world(scene, self.settings, window=self.gui)
+        self.world = new_world(scene, self.settings, window=self.gui)
+        self._dofs: list[int] = []
+        if isinstance(self.settings, GenesisFileSettings):
+            self._load_file(scene)
+        else:
+            self._build(scene)
+
+    def _load_file(self, scene: Scene) -> None:
+        self._own_file = own = GenesisFile(scene, self.settings.timestep, self.world)
+        self.solver, self._ground = own.solver, own.entity
+        self._boxes = dict[str, Any]()
+        self._free = [part.idx for part in own.free]
+        vars(self)["info"] = of_file(type(self).info, own.deviations())  # of this world alone
+
+    def _build(self, scene: Scene) -> None:
+        world = self.world
         self._ground = world.add_entity(
             genesis.morphs.Plane(), material=material(scene.ground_friction)
         )
         self._boxes = {box.name: add_body(world, box, heavy(scene)) for box in scene.bodies}
-        self._robot: Any = None if self.prepared is None else add_robot(world, self.prepared)
+        self._robot = None if self.prepared is None else add_robot(world, self.prepared)
         world.build()
         self.solver = world.rigid_solver
         self._set_contacts(scene)
@@ -136,7 +161,6 @@ class Genesis(Simulator):
         self._free = [self._boxes[box.name].links[0].idx for box in scene.free_bodies]
         self._led = [self._boxes[box.name].links[0] for box in scene.prescribed_bodies]
         self._start_bodies(scene)
-        self._dofs: list[int] = []
         if scene.robot is not None:
             self._set_drives(scene.robot)
 
@@ -211,9 +235,13 @@ class Genesis(Simulator):
         self.command(initial, np.zeros(len(dofs)), np.zeros(len(dofs)))
 
     def read_back(self) -> dict[str, Any]:
+        if self._own_file is not None:
+            return FileReadBack(self, self._own_file).all()
         return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        if self._own_file is not None:
+            raise NotSupportedError(FILE_MOVES)
         self.solver.control_dofs_position_velocity(
             position + effort / self._stiffness, velocity, self._dofs
         )
@@ -235,6 +263,8 @@ class Genesis(Simulator):
         self._steps += 1
 
     def body_state(self) -> FloatArray:
+        if self._own_file is not None:
+            return self._own_file.body_state()
         state = np.empty((len(self._free), 13))
         if self._free:
             state[:, :7] = self._poses(self._free)
@@ -251,6 +281,8 @@ class Genesis(Simulator):
         return np.hstack([position, quaternion / np.linalg.norm(quaternion, axis=1)[:, None]])
 
     def joint_state(self) -> FloatArray:
+        if self._own_file is not None:
+            return self._own_file.joint_state()
         if not self._dofs:
             return np.empty((2, 0))
         return np.stack(
@@ -286,11 +318,16 @@ class Genesis(Simulator):
         return int(array_of(of_collider(self.solver.collider, "collider_state").n_contacts)[0])
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        names = {link.idx: name for name, link in self._links().items()}
+        if self._own_file is not None:
+            names, kind, lift = self._own_file.names(), "geom", self._own_file.own.lift
+        else:
+            names = {link.idx: name for name, link in self._links().items()}
+            kind, lift = "link", 0.0
+        up = np.array([0.0, 0.0, lift])
         found = self.solver.collider.get_contacts(as_tensor=True, to_torch=False)
-        pairs = zip(found["link_a"], found["link_b"], strict=True)
+        pairs = zip(found[f"{kind}_a"], found[f"{kind}_b"], strict=True)
         for (a, b), place, force in zip(pairs, found["position"], found["force"], strict=True):
-            wrench = np.concatenate([force, np.cross(place, force)]).astype(float)
+            wrench = np.concatenate([force, np.cross(place + up, force)]).astype(float)
             yield names[int(b)], names[int(a)], wrench  # the force is on b
 
     def render(self, width: int, height: int) -> NDArray[np.uint8]:

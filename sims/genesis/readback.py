@@ -41,8 +41,12 @@ class ReadBack(readback.ReadBack):
         return {
             "gravity": array_of(rigid.gravity).reshape(3),
             "timestep": array_of(rigid.substep_dt).item() * self.substeps,
-            "ground/height": numbers(self.solver.get_geoms_pos(self._shapes(self.ground)))[0, 2],
+            "ground/height": self.height(),
         }
+
+    def height(self) -> float:
+        """Of the ground."""
+        return float(numbers(self.solver.get_geoms_pos(self._shapes(self.ground)))[0, 2])
 
     def body(self, part: Any, name: str) -> dict[str, Any]:
         led = self._array("links", "inertial_mass")[part.idx] >= heavy(self.scene)
@@ -86,8 +90,10 @@ class ReadBack(readback.ReadBack):
 
     def shapes(self, part: Any) -> Iterator[tuple[str, FloatArray]]:
         for shape in self._shapes(part):
-            place = [*self._array("geoms", "pos")[shape], *self._array("geoms", "quat")[shape]]
-            pose, data = Pose.from_array(place), self._array("geoms", "data")[shape].astype(float)
+            pose, data = (
+                self.shape_pose(part, shape),
+                self._array("geoms", "data")[shape].astype(float),
+            )
             match genesis.GEOM_TYPE(self._array("geoms", "type")[shape]).name:
                 case "BOX":
                     yield "boxes", box_reach(data[:3], pose)
@@ -101,6 +107,11 @@ class ReadBack(readback.ReadBack):
                     ends = (self._array("geoms", f"vert_{end}")[shape] for end in ("start", "end"))
                     corners = self._array("verts", "init_pos")[slice(*ends)].astype(float)
                     yield "meshes", reach(placed(corners, pose))
+
+    def shape_pose(self, part: Any, shape: int) -> Pose:
+        """Of a shape in the frame of its part."""
+        place = [*self._array("geoms", "pos")[shape], *self._array("geoms", "quat")[shape]]
+        return Pose.from_array(place)
 
     def inertial(self, part: Any) -> dict[str, Any]:
         axes = rotation_matrix(self._array("links", "inertial_quat")[part.idx])

@@ -49,6 +49,17 @@ class GenesisSettings(Settings):
     gjk: bool = False
 
 
+@dataclass(frozen=True)
+class GenesisFileSettings(GenesisSettings):
+    """The scene's own file, in a world of the engine's own options.
+
+    Attributes:
+        timestep: [s]; the importer does not read the file's.
+    """
+
+    timestep: float = 0.002
+
+
 TUNED = GenesisSettings(
     timestep=0.002,
     constraint_timeconst=0.004,
@@ -59,6 +70,7 @@ PROFILES: Mapping[str, Settings] = {
     "default": GenesisSettings(),
     "tuned": TUNED,
     "real": TUNED,
+    "file": GenesisFileSettings(),
 }
 
 CHOSEN_ON = chosen_on(

@@ -16,7 +16,7 @@ from pytest_simbench.scene import Body, Box, Capsule, Compound, ConvexMesh, Cyli
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
-from .settings import GenesisSettings
+from .settings import GenesisFileSettings, GenesisSettings
 
 genesis = lazy_import("genesis")
 
@@ -31,7 +31,8 @@ def new_world(scene: Scene, settings: GenesisSettings, *, window: bool) -> Any:
         sim_options=options.SimOptions(dt=s.timestep, substeps=s.substeps, gravity=scene.gravity),
         rigid_options=options.RigidOptions(
             # of a robot, but for links that a joint joins; boxes are entities of their own
-            enable_self_collision="self_collide" in scene.words,
+            enable_self_collision="self_collide" in scene.words
+            or isinstance(s, GenesisFileSettings),
             # also of links that overlap where all joints are at 0, as a Panda's fifth and seventh
             enable_neutral_collision="self_collide" in scene.words,
             integrator=getattr(genesis.integrator, s.integrator),

@@ -10,7 +10,6 @@ What was learnt stands in docs/engines/mujoco.md.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,7 @@ from pytest_simbench.simulator import (
 )
 
 from .bounces import BOUNCES
-from .own_file import FileReadBack, OwnFile
+from .own_file import FileReadBack, OwnFile, of_file
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from .reading import Reading
@@ -93,8 +92,7 @@ class MuJoCo(Simulator):
         self.model, self.data = own.model, own.data
         self._q = self._v = np.array([], dtype=int)
         self._body_ids = own.roots
-        deviations = (*self.info.deviations, *own.deviations())
-        vars(self)["info"] = replace(self.info, deviations=deviations)  # of this world alone
+        vars(self)["info"] = of_file(self.info, own.deviations())  # of this world alone
 
     def _build(self, scene: Scene) -> None:
         self.model = model = build(scene, self.prepared, self.settings)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +12,13 @@ from pytest_simbench.description.carried import CARRIED, named
 from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.pose import quaternion_product
-from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    NotSupportedError,
+    SimulatorInfo,
+    lazy_import,
+)
 
 from .readback import Numbers, Part, ReadBack, contact_forces
 from .reading import Reading
@@ -36,8 +42,19 @@ EXCUSED = {
 }
 """Quantities in which the file may differ from its scene, by those of the account."""
 
-OF_JOINTS = "joint/* link/* gripper/* coupling/* closure/* body/*/touches ground/touches"
+FILE_MOVES = (
+    "in the profile `file` the file's own actuators move its joints; choose another profile for "
+    "motions"
+)
+
+OF_JOINTS = "joint/* link/* gripper/* closure/* coupling/* body/*/touches ground/touches"
 """Quantities of joints and links, which are not read back of a file."""
+
+
+def of_file(info: SimulatorInfo, deviations: Iterable[Deviation] = ()) -> SimulatorInfo:
+    """Facts about an engine that imports a file, which may hold what no scene of it does."""
+    able = info.capabilities | Capability.named("compound loops couplings apart self_collide")
+    return replace(info, capabilities=able, deviations=(*info.deviations, *deviations))
 
 
 class OwnFile:
@@ -58,7 +75,7 @@ class OwnFile:
                 f"scene {scene.name!r} was read from no MJCF file, which the profile `file` loads; "
                 "choose another profile"
             )
-        self.reading = reading = Reading(scene.file)
+        self.reading = reading = self.read(scene.file)
         names = {body.name for body in scene.bodies}
         fixed = {body.name: body.fixed for body in scene.bodies}
         own = {body.name: body.fixed for body in reading.scene.bodies}
@@ -68,7 +85,7 @@ class OwnFile:
                 f"scene {scene.name!r} has other bodies than its file {scene.file}, which the "
                 "profile `file` loads; choose another profile"
             )
-        self.model, self.data = reading.model, mujoco.MjData(reading.model)
+        self.model, self.data = reading.model, reading.data
         self.model.opt.timestep = timestep
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self.placed = {p.body.name: p for p in reading.placed if p.body.name in names}
@@ -101,6 +118,10 @@ class OwnFile:
             self.data.qvel[self._v[k]] = body.linear_velocity - away
             self.data.qvel[self._v[k] + 3] = turn.T @ spin
         mujoco.mj_forward(self.model, self.data)
+
+    def read(self, path: str) -> Reading:
+        """The file, read of the model that is stepped."""
+        return Reading(path)
 
     def deviations(self) -> tuple[Deviation, ...]:
         """In what the file may differ from the scene, as the account has it."""

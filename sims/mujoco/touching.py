@@ -32,7 +32,7 @@ def apart(reading: Reading) -> tuple[Pairs, bool]:
     member = np.repeat(np.arange(len(names)), [len(groups[name]) for name in names])
     share = np.zeros((len(geoms), len(names)))
     share[np.arange(len(geoms)), member] = 1.0
-    meet = share.T @ _collide(reading, geoms) @ share
+    meet = share.T @ collide(reading, geoms) @ share
     whole = np.outer(share.sum(axis=0), share.sum(axis=0))
     links = np.array([name.startswith("link/") for name in names], dtype=bool)
     both = np.outer(links, links)
@@ -54,7 +54,7 @@ def apart(reading: Reading) -> tuple[Pairs, bool]:
     return tuple(pairs), together
 
 
-def _collide(reading: Reading, geoms: list[int]) -> FloatArray:
+def collide(reading: Reading, geoms: list[int]) -> FloatArray:
     """1 for each two of these that MuJoCo lets collide, else 0: its rules, from its documentation
     ("Computation, Collision detection"): same body, parent and child, masks; pairs by name do."""
     model, off = reading.model, mujoco.mjtDisableBit

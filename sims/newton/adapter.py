@@ -23,6 +23,7 @@ from pytest_simbench.scene import Body, FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
+    NotSupportedError,
     Simulator,
     SimulatorInfo,
     heavy,
@@ -30,9 +31,12 @@ from pytest_simbench.simulator import (
 )
 
 from ..mujoco.bounces import BOUNCES, direct
+from ..mujoco.own_file import FILE_MOVES, FileReadBack, of_file
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
+from ..mujoco.settings import FileSettings
 from ..mujoco.world import leave_out, shape_label
+from .own_file import NewtonFile
 from .settings import CHOSEN_ON, PROFILES, NewtonSettings
 from .world import build_model, make_solver, names
 
@@ -90,7 +94,14 @@ class Newton(Simulator):
     chosen_on = CHOSEN_ON
     settings: NewtonSettings
 
+    _own_file: NewtonFile | None = None
+    _ctrl: Any = None
     _compiled: ClassVar[set[bool]] = set()
+
+    def __init__(self, settings: Any, *, gui: bool = False) -> None:
+        super().__init__(settings, gui=gui)
+        if isinstance(settings, FileSettings):
+            vars(self)["info"] = of_file(self.info)
 
     def compile(self, scene: Scene) -> None:
         """Load the world once and step it: Warp then has every kernel, on disk and in memory.
@@ -108,6 +119,20 @@ class Newton(Simulator):
         self.begin(scene)
         wp.config.log_level = wp.LOG_WARNING
         self._viewer: Any = None
+        if isinstance(self.settings, FileSettings):
+            self._load_file(scene)
+        else:
+            self._build(scene)
+        if self.gui:
+            self._open_window()
+
+    def _load_file(self, scene: Scene) -> None:
+        self._own_file = own = NewtonFile(scene, self.settings.timestep)
+        self.model, self.solver = own.imported, own.solver
+        self._states, self._free, self._control = own.states, own.free, own.imported.control()
+        vars(self)["info"] = of_file(type(self).info, own.deviations())  # of this world alone
+
+    def _build(self, scene: Scene) -> None:
         self.model = build_model(scene, self.prepared, self.settings)
         self._number(scene)
         self.solver = make_solver(self.model, self.prepared, self.settings)
@@ -115,12 +140,10 @@ class Newton(Simulator):
         self._states = [self.model.state(), self.model.state()]
         self._control = self.model.control()
         ctrl = self._control.mujoco.ctrl if scene.robot is not None else None
-        self._ctrl: Any = None if ctrl is None else ctrl.numpy()  # a view: the device is the CPU
+        self._ctrl = None if ctrl is None else ctrl.numpy()  # a view: the device is the CPU
         for state in self._states:
             newton.eval_fk(self.model, self.model.joint_q, self.model.joint_qd, state)
         self._show_mujoco_the_start()
-        if self.gui:
-            self._open_window()
 
     def _set_mujoco(self, scene: Scene) -> None:
         """Restitution and damping of bodies, which only MuJoCo's own model holds."""
@@ -181,10 +204,14 @@ class Newton(Simulator):
 
     def read_back(self) -> dict[str, Any]:
         """From MuJoCo's model, which is what is stepped."""
+        if self._own_file is not None:
+            return FileReadBack(self, self._own_file).all()
         model, data = self.solver.mj_model, self.solver.mj_data
         return ReadBack(self, model, data, self._numbers()).all()
 
     def _numbers(self) -> Numbers:
+        if self._own_file is not None:
+            return self._own_file.numbers()
         prepared = self.prepared
         bodies = self.solver.mjc_body_to_newton.numpy()[0].tolist()
         labels = names(self.model.body_label)
@@ -211,6 +238,8 @@ class Newton(Simulator):
         return numbers
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        if self._own_file is not None:
+            raise NotSupportedError(FILE_MOVES)
         self._ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
 
     def push(self, wrenches: FloatArray) -> None:
@@ -234,6 +263,8 @@ class Newton(Simulator):
         self._steps += 1
 
     def body_state(self) -> FloatArray:
+        if self._own_file is not None:
+            return self._own_file.body_state()
         state = self._states[0]
         rows = np.empty((len(self._free), 13))
         if self._free:
@@ -245,6 +276,8 @@ class Newton(Simulator):
         return rows
 
     def joint_state(self) -> FloatArray:
+        if self._own_file is not None:
+            return self._own_file.joint_state()
         state = self._states[0]
         if not len(self._q):
             return np.empty((2, 0))
@@ -273,6 +306,8 @@ class Newton(Simulator):
         self._steps = state["steps"]
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        if self._own_file is not None:
+            return self._own_file.contact_forces()
         return contact_forces(self.solver.mj_model, self.solver.mj_data, self._numbers())
 
     def joint_wrenches(self) -> FloatArray:

@@ -8,6 +8,8 @@ from typing import Literal
 
 from pytest_simbench.simulator import Seen, Settings
 
+from ..mujoco.settings import FileSettings
+
 
 @dataclass(frozen=True)
 class NewtonSettings(Settings):
@@ -51,6 +53,7 @@ PROFILES: Mapping[str, Settings] = {
     "default": NewtonSettings(),
     "tuned": TUNED,
     "real": replace(TUNED, ke=62500.0),
+    "file": FileSettings(),
 }
 
 CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {"real": (Seen.motions("cube_tosses", 0, 564, 6),)}
