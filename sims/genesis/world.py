@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.links import reduced
+from pytest_simbench.description.links import frames, reduced
 from pytest_simbench.description.shapes import write_obj
 from pytest_simbench.description.urdf import body_urdf
 from pytest_simbench.scene import Body, Box, Capsule, Compound, ConvexMesh, Cylinder, Scene, Sphere
@@ -133,7 +133,11 @@ def add_robot(world: Any, prepared: PreparedRobot) -> Any:
         _hold(robot, "JOINT", pair.follower, pair.leader, [pair.offset, pair.ratio])
     for closure in reduced(prepared):
         points = [*closure.first_point, *closure.second_point]
-        _hold(robot, "CONNECT", closure.first, closure.second, points)
+        if closure.rigid:  # a weld's data begin with the point of what it names second
+            turn = frames(prepared, closure)[1].quaternion
+            _hold(robot, "WELD", closure.second, closure.first, [*points, *turn, 1.0])
+        else:
+            _hold(robot, "CONNECT", closure.first, closure.second, points)
     return robot
 
 
