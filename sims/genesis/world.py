@@ -16,6 +16,7 @@ from pytest_simbench.scene import Body, Box, Capsule, Compound, ConvexMesh, Cyli
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
+from .engine import array_of
 from .settings import GenesisSettings
 
 genesis = lazy_import("genesis")
@@ -135,10 +136,19 @@ def add_robot(world: Any, prepared: PreparedRobot) -> Any:
         points = [*closure.first_point, *closure.second_point]
         if closure.rigid:  # a weld's data begin with the point of what it names second
             turn = frames(prepared, closure)[1].quaternion
-            _hold(robot, "WELD", closure.second, closure.first, [*points, *turn, 1.0])
+            _hold(robot, "CONNECT", closure.second, closure.first, [*points, *turn, 1.0])
         else:
             _hold(robot, "CONNECT", closure.first, closure.second, points)
     return robot
+
+
+def weld(solver: Any, prepared: PreparedRobot) -> None:
+    """Make welds of rigid closures, once the world is built: of links that it finds welded,
+    Genesis' collider leaves the pair out."""
+    kinds = array_of(solver.dyn_info.equalities.eq_type, copy=False)
+    loops = np.flatnonzero(kinds[: solver.n_equalities, 0] == genesis.EQUALITY_TYPE.CONNECT)
+    rigid = [closure.rigid for closure in reduced(prepared)]
+    kinds[loops[rigid]] = genesis.EQUALITY_TYPE.WELD
 
 
 def _hold(robot: Any, kind: str, first: str, second: str, numbers: list[float]) -> None:
