@@ -47,7 +47,7 @@ from .engine import (
 from .own_file import FileReadBack, GenesisFile
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, GenesisFileSettings, GenesisSettings
-from .world import LEAST_FRICTION, add_body, add_camera, add_robot, material, new_world
+from .world import LEAST_FRICTION, add_body, add_camera, add_robot, material, new_world, weld
 
 genesis = lazy_import("genesis")
 
@@ -156,6 +156,8 @@ class Genesis(Simulator):
         self._robot = None if self.prepared is None else add_robot(world, self.prepared)
         world.build()
         self.solver = world.rigid_solver
+        if self.prepared is not None and self.prepared.robot.closures:
+            weld(self.solver, self.prepared)
         self._set_contacts(scene)
         keep_apart(self.solver.collider, self._links(), scene.apart)
         self._free = [self._boxes[box.name].links[0].idx for box in scene.free_bodies]

@@ -68,7 +68,8 @@ class ReadBack(readback.ReadBack):
 
     def closures(self) -> list[FloatArray]:
         _, _, kinds = self._equalities()
-        loops = np.flatnonzero(kinds == genesis.EQUALITY_TYPE.CONNECT)
+        joined = (genesis.EQUALITY_TYPE.CONNECT, genesis.EQUALITY_TYPE.WELD)
+        loops = np.flatnonzero(np.isin(kinds, joined))
         data = self._array("equalities", "eq_data")[loops, 0]
         return [row[:6].reshape(2, 3) for row in data]
 

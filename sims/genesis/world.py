@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.links import reduced
+from pytest_simbench.description.links import frames, reduced
 from pytest_simbench.description.shapes import write_obj
 from pytest_simbench.description.urdf import body_urdf
 from pytest_simbench.scene import Body, Box, Capsule, Compound, ConvexMesh, Cylinder, Scene, Sphere
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_import
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
+from .engine import array_of
 from .settings import GenesisFileSettings, GenesisSettings
 
 genesis = lazy_import("genesis")
@@ -134,8 +135,21 @@ def add_robot(world: Any, prepared: PreparedRobot) -> Any:
         _hold(robot, "JOINT", pair.follower, pair.leader, [pair.offset, pair.ratio])
     for closure in reduced(prepared):
         points = [*closure.first_point, *closure.second_point]
-        _hold(robot, "CONNECT", closure.first, closure.second, points)
+        if closure.rigid:  # a weld's data begin with the point of what it names second
+            turn = frames(prepared, closure)[1].quaternion
+            _hold(robot, "CONNECT", closure.second, closure.first, [*points, *turn, 1.0])
+        else:
+            _hold(robot, "CONNECT", closure.first, closure.second, points)
     return robot
+
+
+def weld(solver: Any, prepared: PreparedRobot) -> None:
+    """Make welds of rigid closures, once the world is built: of links that it finds welded,
+    Genesis' collider leaves the pair out."""
+    kinds = array_of(solver.dyn_info.equalities.eq_type, copy=False)
+    loops = np.flatnonzero(kinds[: solver.n_equalities, 0] == genesis.EQUALITY_TYPE.CONNECT)
+    rigid = [closure.rigid for closure in reduced(prepared)]
+    kinds[loops[rigid]] = genesis.EQUALITY_TYPE.WELD
 
 
 def _hold(robot: Any, kind: str, first: str, second: str, numbers: list[float]) -> None:

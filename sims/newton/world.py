@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.links import reduced
+from pytest_simbench.description.links import frames, reduced
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -75,16 +75,20 @@ def make_solver(model: Any, prepared: PreparedRobot | None, settings: NewtonSett
     # Newton's own stops (10 kN m/rad, 10 N m s/rad) give a lever of 5 kg half of its way back.
     solver.mj_model.jnt_solref[:] = STOPS
     if prepared is not None:
-        _set_second_points(solver.mj_model, prepared)
+        _set_points(solver.mj_model, prepared)
     return solver
 
 
-def _set_second_points(model: Any, prepared: PreparedRobot) -> None:
-    """MuJoCo finds a closure's point of the second link at its own zero posture, where the loop is
-    open. So the scene's are written."""
-    loops = model.eq_type == mujoco.mjtEq.mjEQ_CONNECT
+def _set_points(model: Any, prepared: PreparedRobot) -> None:
+    """MuJoCo finds a closure's point of the second link, and a weld's turn, at its own zero
+    posture, where the loop is open. So the scene's are written."""
+    kinds = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
+    loops = np.isin(model.eq_type, kinds) & (model.eq_active0 != 0)  # free bodies have idle welds
     for number, closure in zip(np.flatnonzero(loops), reduced(prepared), strict=True):
         model.eq_data[number, 3:6] = closure.second_point
+        if closure.rigid:
+            model.eq_data[number, :3] = closure.first_point
+            model.eq_data[number, 6:10] = frames(prepared, closure)[1].quaternion
 
 
 STOPS = (0.02, 1.0)
@@ -117,12 +121,13 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
         _set_drive(builder, joints.index(joint.name), joint)
     links = names(builder.body_label)
     for closure in reduced(prepared):
-        newton.solvers.mujoco.add_equality_connect(
-            builder,
-            links.index(closure.first),
-            links.index(closure.second),
-            anchor=wp.vec3(*closure.first_point),
-        )
+        first, second = links.index(closure.first), links.index(closure.second)
+        if closure.rigid:  # a weld's data begin with the point of what it names second
+            newton.solvers.mujoco.add_equality_weld(builder, second, first)
+        else:
+            newton.solvers.mujoco.add_equality_connect(
+                builder, first, second, anchor=wp.vec3(*closure.first_point)
+            )
     for pair in (*robot.gripper.couplings, *robot.couplings):
         newton.solvers.mujoco.add_equality_joint(
             builder,

@@ -33,7 +33,7 @@ from pytest_simbench.simulator import NotSupportedError, PreparedRobot, lazy_imp
 
 from .axes import Axis
 from .contacts import BASE, FIXED, FREE, GROUND, LINK, LINKS, Part, Surface
-from .library import Convex, Mesh, place, set_damping
+from .library import HI_STOP, LO_STOP, Convex, Mesh, place, set_damping
 
 ode = lazy_import("ode")
 
@@ -152,11 +152,16 @@ def put_links(
 def close_loop(
     world: Any, prepared: PreparedRobot, links: Mapping[str, Part], closure: Closure
 ) -> Any:
-    """Hold two links together by a ball joint; they stand at the joints' initial positions."""
+    """Hold two links together by a ball joint, or weld them; they stand at the joints' initial
+    positions. A weld is a hinge that is stopped on both sides: ODE's fixed joint tells no point."""
     first, second = ends(prepared, closure)
-    made = ode.BallJoint(world)
+    made = ode.HingeJoint(world) if closure.rigid else ode.BallJoint(world)
     made.attach(links[closure.first].body, links[closure.second].body)
     made.setAnchor(tuple((first + second) / 2))
+    if closure.rigid:
+        made.setAxis((0.0, 0.0, 1.0))
+        made.setParam(LO_STOP, 0.0)
+        made.setParam(HI_STOP, 0.0)
     return made
 
 

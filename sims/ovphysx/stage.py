@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.links import reduced
+from pytest_simbench.description.links import frames, reduced
 from pytest_simbench.description.stl import read_stl
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape
 from pytest_simbench.scene import (
@@ -225,7 +225,7 @@ class Stage:
             limits, mimic = prepared.limits[joint.name], mimics.get(joint.name, [])
             prims.append(_joint(index, joint, robot.joints[index], limits, names, mimic))
         for k, closure in enumerate(reduced(prepared)):
-            prims.append(_closure(k, closure, names))
+            prims.append(_closure(k, closure, frames(prepared, closure), names))
         return prims
 
     def _link(self, link: Link, pose: Pose, friction: float) -> str:
@@ -270,8 +270,8 @@ def _material(friction: float, restitution: float) -> str:
     return name.translate(str.maketrans(".-+", "pmp"))
 
 
-def _closure(number: int, closure: Closure, links: Sequence[str]) -> str:
-    """A ball joint beside the articulation, which is a tree."""
+def _closure(number: int, closure: Closure, ends: tuple[Pose, Pose], links: Sequence[str]) -> str:
+    """A ball joint or a weld beside the articulation, which is a tree."""
     lines = [
         f"rel physics:body0 = <{link_path(links.index(closure.first))}>",
         f"rel physics:body1 = <{link_path(links.index(closure.second))}>",
@@ -279,7 +279,11 @@ def _closure(number: int, closure: Closure, links: Sequence[str]) -> str:
         f"point3f physics:localPos1 = {usd.numbers(closure.second_point)}",
         "bool physics:excludeFromArticulation = true",
     ]
-    return usd.prim("PhysicsSphericalJoint", f"closure_{number}", (), lines)
+    if closure.rigid:
+        for k, end in enumerate(ends):
+            lines.append(f"quatf physics:localRot{k} = {usd.numbers(end.quaternion)}")
+    kind = "PhysicsFixedJoint" if closure.rigid else "PhysicsSphericalJoint"
+    return usd.prim(kind, f"closure_{number}", (), lines)
 
 
 def _mimic(pair: Coupling, leader: int, kinds: Mapping[str, str]) -> list[str]:
