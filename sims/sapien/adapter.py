@@ -76,6 +76,12 @@ class SAPIEN(Simulator):
                 only="restitution",
             ),
             Deviation("", "contact forces are those along the normals, without friction"),
+            Deviation(
+                "",
+                "welded links of two branches that turn about odd axes turn to each other, by 0.5 "
+                "rad in 0.3 s; those of parallel axes do not",
+                only="loop",
+            ),
             Deviation("", "window and pictures take a Vulkan device"),
             Deviation("", "a restored world has the saved poses and velocities, but new contacts"),
         ),
