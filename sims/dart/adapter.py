@@ -201,8 +201,11 @@ class DART(Simulator):
         self.world.addSkeleton(skeleton)
         for closure in reduced(prepared):
             bodies = (skeleton.getBodyNode(link) for link in (closure.first, closure.second))
-            place, _ = ends(prepared, closure)
-            held = dartpy.constraint.BallJointConstraint(*bodies, place)
+            if closure.rigid:  # as they are now
+                held = dartpy.constraint.WeldJointConstraint(*bodies)
+            else:
+                place, _ = ends(prepared, closure)
+                held = dartpy.constraint.BallJointConstraint(*bodies, place)
             self.world.getConstraintSolver().addConstraint(held)
         self._error_gain = np.zeros(len(names))
         self._error_gain[self._index] = self._gain

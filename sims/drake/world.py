@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.links import joined, reduced
+from pytest_simbench.description.links import OPEN, ends, frames, joined, reduced
 from pytest_simbench.description.shapes import mesh_points
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape
 from pytest_simbench.scene import (
     Body,
     Box,
     Capsule,
+    Closure,
     Compound,
     ConvexMesh,
     Cylinder,
@@ -252,7 +253,11 @@ class World:
         ]
         for closure in reduced(prepared):
             first, second = self.links[closure.first], self.links[closure.second]
-            plant.AddBallConstraint(first, closure.first_point, second, closure.second_point)
+            if closure.rigid:
+                a, b = map(transform, frames(prepared, closure))
+                plant.AddWeldConstraint(first, a, second, b)
+            elif _parts(prepared, closure):
+                plant.AddBallConstraint(first, closure.first_point, second, closure.second_point)
 
     def _add_own(self, own: Joint) -> None:
         """What a joint does by itself. Drake has no friction of it: a second actuator brakes."""
@@ -313,6 +318,13 @@ def _solid(body: Body) -> tuple[Any, str, tuple[Any, ...]]:
         case ConvexMesh():
             return geometry.Convex(points=np.array(body.vertices).T, label=body.name), "", ()
     raise NotSupportedError(f"drake has no {type(body).__name__}")
+
+
+def _parts(prepared: PreparedRobot, closure: Closure) -> bool:
+    """Whether joints can part a closure's points. Drake makes NaN of a ball where none can."""
+    moved = prepared.robot.column("initial_position") + np.arange(1, len(prepared.joints) + 1) / 3
+    first, second = ends(prepared, closure, moved)
+    return float(np.linalg.norm(first - second)) > OPEN
 
 
 def transform(pose: Pose) -> Any:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.description.links import joined, motion_subspace, reduced
+from pytest_simbench.description.links import frames, joined, motion_subspace, reduced
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
@@ -218,7 +218,8 @@ class PyBullet(Simulator):
             step = self.settings.timestep
             self._pushed = Pushed(c, self._robot, self._joints, robot, step)
         self._closures = [
-            close_loop(c, self._robot, self._links, closure) for closure in reduced(prepared)
+            close_loop(c, self._robot, self._links, closure, frames(prepared, closure))
+            for closure in reduced(prepared)
         ]
         n = len(self._joints)
         self._forces = [0.0 if joint.motor else joint.effort_limit for joint in robot.joints]

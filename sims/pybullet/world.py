@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,6 @@ from pytest_simbench.scene import (
     FloatArray,
     Pose,
     Sphere,
-    Vector3,
 )
 from pytest_simbench.simulator import NotSupportedError, lazy_import
 
@@ -166,18 +165,26 @@ STRONGEST = 1e5
 """Largest force of a closure [N]. Bullet's own, 500 N, lets go of heavier links."""
 
 
-def close_loop(client: int, robot: int, links: Mapping[str, int], closure: Closure) -> int:
-    """Hold the points together; Bullet's number of the constraint."""
+def close_loop(
+    client: int, robot: int, links: Mapping[str, int], closure: Closure, frames: Iterable[Pose]
+) -> int:
+    """Hold the frames' points together, or the frames; Bullet's number of the constraint."""
     first, second = links[closure.first], links[closure.second]
+    a, b = (
+        inertial_frame(client, robot, link).inverse() * frame
+        for link, frame in zip((first, second), frames, strict=True)
+    )
     made: int = pybullet.createConstraint(
         robot,
         first,
         robot,
         second,
-        pybullet.JOINT_POINT2POINT,
+        pybullet.JOINT_FIXED if closure.rigid else pybullet.JOINT_POINT2POINT,
         [0, 0, 0],
-        _from_centre(client, robot, first, closure.first_point),
-        _from_centre(client, robot, second, closure.second_point),
+        a.position,
+        b.position,
+        (*a.quaternion[1:], a.quaternion[0]),
+        (*b.quaternion[1:], b.quaternion[0]),
         physicsClientId=client,
     )
     pybullet.changeConstraint(made, maxForce=STRONGEST, physicsClientId=client)
@@ -189,11 +196,6 @@ def points(client: int, constraint: int) -> FloatArray:
     info = pybullet.getConstraintInfo(constraint, physicsClientId=client)
     body, ends = info[0], ((info[1], info[6]), (info[3], info[7]))
     return np.array([(inertial_frame(client, body, link) * Pose(at)).position for link, at in ends])
-
-
-def _from_centre(client: int, robot: int, link: int, point: Vector3) -> Any:
-    """A point of a link in the frame that Bullet counts from, at its centre of mass."""
-    return (inertial_frame(client, robot, link).inverse() * Pose(point)).position
 
 
 def inertial_frame(client: int, body: int, link: int) -> Pose:
