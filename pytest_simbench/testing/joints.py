@@ -202,7 +202,7 @@ def welded_links_are_one(subject: Subject) -> None:
         parts.append(Part(f"lever {k}", Y, offset, (LEVER, 0.0, 0.0), inertia=INERTIA))
     last = tuple(np.sum(offsets, axis=0).tolist())
     weld = Closure(parts[0].link, parts[-1].link, vector3(last), rigid=True)
-    centres = np.cumsum([(0.0, 0.0, 0.0), *offsets], axis=0) + (LEVER, 0.0, 0.0)
+    centres = np.cumsum([(LEVER, 0.0, 0.0), *offsets], axis=0)
     inertia = len(parts) * INERTIA[1] + MASS * float(np.sum(centres**2))
     x, _, z = centres.sum(axis=0)
 
