@@ -22,8 +22,11 @@ from pytest_simbench.simulator.registry import adapter, address, registered
 URDF = ".urdf"
 """Ending of scenes that need no engine to be read."""
 
-NOT_YET = (".sdf", ".world", ".usd", ".usda", ".usdc", ".usdz")
-"""Endings of scenes that nobody here reads yet."""
+NOT_YET = {
+    **dict.fromkeys((".sdf", ".world"), "sdformat-mjcf"),
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), "usd2mjcf"),
+}
+"""By endings of scenes that nobody here reads yet: a package on PyPI that converts them to MJCF."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,8 @@ def _reader(path: Path) -> SimulatorInfo:
     known = ", ".join(sorted({URDF, *(ending for info in infos for ending in info.reads)}))
     if ending in NOT_YET:
         raise DescriptionError(
-            f"{path}: {ending} files are not read yet; convert it to MJCF ({known})"
+            f"{path}: {ending} files are not read yet; convert it to MJCF ({known}), by "
+            f"{NOT_YET[ending]}"
         )
     raise DescriptionError(f"{path}: no engine here reads {ending or 'such'} files; give {known}")
 

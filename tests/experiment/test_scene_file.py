@@ -32,8 +32,8 @@ def test_a_file_is_read_once_until_it_changes(
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("a.usd", "usd files are not read yet; convert"),
-        ("a.sdf", "sdf files are not read yet; convert"),
+        ("a.usd", "usd files are not read yet; .* by usd2mjcf"),
+        ("a.sdf", "sdf files are not read yet; .* by sdformat-mjcf"),
         ("a.txt", "no engine here reads .txt files; give .*xml"),
         ("a.xml", "No such file"),
     ],
