@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from pytest_simbench.ground.text import for_markdown
+from pytest_simbench.records import lines
+from pytest_simbench.records.paths import write_whole
 from pytest_simbench.scene.wire import Wire
 
 CARRIED, APPROXIMATED, NOT_CARRIED = STATES = ("carried", "approximated", "not carried")
 """The scene holds it as the file has it; nearly so; not at all."""
+
+LINES, PAGE = "carried.jsonl", "carried.md"
+"""Of a run folder: the accounts of the files that were read."""
 
 MOST_NAMED = 3
 """Elements that a line names, and quantities that the terminal names."""
@@ -49,7 +57,7 @@ def named(names: Iterable[str], between: str = ", ") -> str:
 
 def markdown(title: str, account: Sequence[Carried]) -> str:
     """The page `carried.md`: what is not carried first."""
-    lines = [
+    page = [
         f"# What was carried of {for_markdown(title)}",
         "",
         "| quantity | state | how, or why not | where |",
@@ -57,8 +65,8 @@ def markdown(title: str, account: Sequence[Carried]) -> str:
     ]
     for line in sorted(account, key=lambda line: -STATES.index(line.state)):
         cells = (line.quantity, line.state, line.reason, line.where)
-        lines.append(f"| {' | '.join(for_markdown(text, cell=True) for text in cells)} |")
-    return "\n".join(lines) + "\n"
+        page.append(f"| {' | '.join(for_markdown(text, cell=True) for text in cells)} |")
+    return "\n".join(page) + "\n"
 
 
 def terminal_lines(account: Sequence[Carried]) -> list[str]:
@@ -69,3 +77,36 @@ def terminal_lines(account: Sequence[Carried]) -> list[str]:
         if quantities:
             found.append(f"{state} ({len(quantities)}): {named(quantities, '; ')}")
     return found
+
+
+Accounts = dict[str, tuple[Carried, ...]]
+"""By the names of the files that were read."""
+
+
+def kept(folder: Path) -> Accounts:
+    """The accounts in a run folder; lines that are none of ours are passed over."""
+    try:
+        found = lines.read(folder, LINES, _line).items
+    except lines.UnreadableError:
+        return {}
+    accounts: dict[str, list[Carried]] = {}
+    for title, line in found:
+        accounts.setdefault(title, []).append(line)
+    return {title: tuple(account) for title, account in accounts.items()}
+
+
+def keep(folder: Path, title: str, account: Sequence[Carried]) -> None:
+    """Write the account of a file into a run folder, beside those of others."""
+    every = kept(folder) | {title: tuple(account)}
+    rows = [{"file": name, **line.to_wire()} for name, told in every.items() for line in told]
+    write_whole(folder, LINES, "".join(json.dumps(row) + "\n" for row in rows).encode())
+    pages = (markdown(name, told) for name, told in every.items())
+    write_whole(folder, PAGE, "\n".join(pages).encode())
+
+
+def _line(data: dict[str, Any], where: str) -> tuple[str, Carried]:
+    names = ("file", "quantity", "state", "reason", "where")
+    if set(data) - set(names) or not all(isinstance(data.get(n, ""), str) for n in names):
+        raise ValueError(f"{where} is no line of an account")
+    title, *rest = (data.get(name, "") for name in names)
+    return title, Carried(*rest)

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from pytest_simbench.scene import Scene, Start
     from pytest_simbench.tasks import Log
 
-ACCOUNT = "carried.md"
-"""Of the run folder: what of the scenes' files was carried."""
-
 KEYFRAMES = "keyframes"
 """In place of a file of starts: those that the scene's file holds."""
 
@@ -104,10 +101,9 @@ class SceneFiles:
             starts: of a file of starts (.npz), see `description.starts`, or `KEYFRAMES`; None: the
                 scene starts as it is written.
         """
-        from pytest_simbench.description.carried import markdown, terminal_lines
+        from pytest_simbench.description.carried import PAGE, keep, terminal_lines
         from pytest_simbench.description.starts import distinct, read_starts
         from pytest_simbench.experiment.scene_file import read_scene_file
-        from pytest_simbench.records.paths import write_whole
         from pytest_simbench.scene import SceneError
 
         given = options.value(self.request.config, "sim_scene")
@@ -130,9 +126,9 @@ class SceneFiles:
                     f"{starts}: {len(rows)} starts, and {different} different in how the bodies "
                     f"lie to each other: as evidence they count as {different}"
                 )
-        write_whole(self.folder, ACCOUNT, markdown(at.name, found.account).encode())
+        keep(self.folder, at.name, found.account)
         for line in terminal_lines(found.account):
-            self.tell(f"{at.name}: {line} ({ACCOUNT})")
+            self.tell(f"{at.name}: {line} ({PAGE})")
         return scene
 
 

@@ -8,10 +8,18 @@ import numpy as np
 import pytest
 
 from pytest_simbench.description import mjcf_check
-from pytest_simbench.description.carried import Carried, markdown, named, terminal_lines
+from pytest_simbench.description.carried import (
+    Carried,
+    keep,
+    kept,
+    markdown,
+    named,
+    terminal_lines,
+)
 from pytest_simbench.description.mjcf_check import check_mjcf
 from pytest_simbench.description.starts import distinct, read_starts
 from pytest_simbench.ground.errors import DescriptionError
+from pytest_simbench.report.model.carried import sections
 from pytest_simbench.scene import Box, Pose, Scene
 
 ACCOUNT = (
@@ -125,6 +133,28 @@ SCENE = Scene(
 
 def rows(*places: tuple[float, float, float]) -> np.ndarray:
     return np.array([[*place, 1.0, 0.0, 0.0, 0.0] for place in places])
+
+
+def test_accounts_of_several_files_stand_side_by_side(tmp_path: Path) -> None:
+    keep(tmp_path, "a.xml", ACCOUNT[:1])
+    keep(tmp_path, "b.xml", ACCOUNT)
+    keep(tmp_path, "a.xml", ACCOUNT[1:])
+    assert kept(tmp_path) == {"a.xml": tuple(ACCOUNT[1:]), "b.xml": tuple(ACCOUNT)}
+    page = (tmp_path / "carried.md").read_text()
+    assert page.count("# What was carried of") == 2
+    shown = sections(tmp_path)
+    assert [section.title for section in shown] == [
+        "What was carried of a.xml", "What was carried of b.xml",
+    ]  # fmt: skip
+    assert len(shown[1].tables[0].columns[0].cells) == len(ACCOUNT)
+
+
+@pytest.mark.parametrize("line", ['{"file": 1}', '{"x": "y"}', '{"state": "odd"}', "[]", "x"])
+def test_lines_that_are_no_account_are_passed_over(tmp_path: Path, line: str) -> None:
+    keep(tmp_path, "a.xml", ACCOUNT)
+    with (tmp_path / "carried.jsonl").open("a") as file:
+        file.write(line + "\n")
+    assert kept(tmp_path) == {"a.xml": tuple(ACCOUNT)}
 
 
 def test_equal_starts_elsewhere_on_the_table_are_one(tmp_path: Path) -> None:

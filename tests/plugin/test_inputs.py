@@ -103,6 +103,8 @@ def test_alone_it_runs_the_suite_and_says_whether_a_difference_is_noise(
     assert steps == {(name, own[name] / times) for name in own for times in (1, 4, 8)}
     page = (pytester.path / "run" / "report.html").read_text()
     assert page.index("ends alike in all 2") < page.index("Scene blocks")
+    assert page.index("Scene blocks") < page.index("What was carried of blocks.xml")
+    assert "softness of contacts" in page
 
 
 @pytest.mark.engine

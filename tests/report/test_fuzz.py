@@ -22,6 +22,8 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from pytest_simbench.description.carried import LINES as ACCOUNTS
+from pytest_simbench.description.carried import Carried, keep
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.measure.limits import Limit
@@ -107,6 +109,8 @@ def folder() -> Path:
     run.claim(replace(placed, mean=0.5, low=0.4, high=0.6, n=3, crashed=1, advice=""))
     run.claim(replace(placed, simulator="drake", verdict="UNDECIDED", mean=0.9, n=3))
     run.close()
+    account = [Carried("mass", "carried", "as compiled"), Carried("tendon", "not carried", "no")]
+    keep(path, "scene.xml", account)
     for line in (LINE, REPLAY):
         repeatability.append(path, line)
     RunOutcome(False, "before", compared()).write(path)
@@ -179,7 +183,7 @@ def names() -> list[str]:
     return sorted(str(p.relative_to(folder())) for p in folder().rglob("*") if p.is_file())
 
 
-TEXTS = (RECORDS, TASKS, THRESHOLDS, CLAIMS, repeatability.NAME, OUTCOME, BENCHMARKS)
+TEXTS = (RECORDS, TASKS, THRESHOLDS, CLAIMS, ACCOUNTS, repeatability.NAME, OUTCOME, BENCHMARKS)
 ODD = st.sampled_from(
     [None, True, 0, -1, 1e308, -1e-308, 10**20, 10**400, float("nan"), float("inf"), "", "x", "ok",
      "x" * 3000, "a\nb", "\ud800", "../x", "\x1b[2J", [], {}, [[]], [None], {"": {}}, {"a": "b"},

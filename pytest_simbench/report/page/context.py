@@ -10,7 +10,15 @@ from typing import Any
 
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.model import cells, changes, repeatability, sweep, tables, truth
+from pytest_simbench.report.model import (
+    carried,
+    cells,
+    changes,
+    repeatability,
+    sweep,
+    tables,
+    truth,
+)
 from pytest_simbench.report.model.answer import headline
 from pytest_simbench.report.model.claims import command
 from pytest_simbench.report.model.document import Of, Table
@@ -57,6 +65,7 @@ def page(
         "problems": dict.fromkeys(filter(None, [*(why for _, why in drawn), *problems, problem])),
         "filters": {name: found for name, found in choices.items() if len(found) > 1},
         "scenes": report.scenes,
+        "carried": carried.sections(folder),
         "truth": truth.section(summaries),
         "sweep": sweep.section(report.sweeps),
         "swept": swept,
