@@ -52,6 +52,7 @@ _FUNCTIONS: dict[str, tuple[Any, Sequence[Any]]] = {
         None,
         [_ID, _ID, ctypes.c_int, ctypes.c_int, _ID, ctypes.c_int, ctypes.c_int],
     ),
+    "dGeomTriMeshDataPreprocess2": (ctypes.c_int, [_ID, ctypes.c_uint, _ID]),
     "dGeomTriMeshDataDestroy": (None, [_ID]),
     "dCreateTriMesh": (_ID, [_ID, _ID, _ID, _ID, _ID]),
     "dCreateConvex": (_ID, [_ID, _ID, ctypes.c_uint, _ID, ctypes.c_uint, _ID]),
@@ -140,6 +141,10 @@ class Convex(_Own):
         super().__init__(space, made)
 
 
+FACE_ANGLES = 1 << 1
+"""`dTRIDATAPREPROCESS_BUILD_FACE_ANGLES` as a bit."""
+
+
 class Mesh(_Own):
     """A triangle mesh.
 
@@ -163,6 +168,8 @@ class Mesh(_Own):
             len(self._numbers),
             3 * self._numbers.itemsize,
         )
+        # without them ODE aborts where a convex body touches the mesh
+        library().dGeomTriMeshDataPreprocess2(self._data, FACE_ANGLES, None)
         super().__init__(space, library().dCreateTriMesh(space._id(), self._data, None, None, None))
 
     def __del__(self) -> None:

@@ -21,7 +21,7 @@ from pytest_simbench.client.environments import interpreter
 from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.world import World
 from pytest_simbench.laws.mechanisms import Part, Y, mechanism
-from pytest_simbench.scene import Coupling, FloatArray, Robot, Scene, Trajectory
+from pytest_simbench.scene import ConvexMesh, Coupling, FloatArray, Pose, Robot, Scene, Trajectory
 from pytest_simbench.testing import scenes
 
 from .ode_faults import Mortal, RawTip, Tip
@@ -209,6 +209,17 @@ def test_joints_of_no_common_link_are_refused(worlds: Worlds) -> None:
     )
     with pytest.raises(EngineFailed, match="rack and lever have none in common"):
         worlds.load(Scene("far", robot=robot))
+
+
+def test_a_convex_body_may_touch_the_mesh_of_a_link(worlds: Worlds) -> None:
+    """ODE aborts where it does and the mesh has no angles of its faces."""
+    wedge = ConvexMesh("wedge", scenes.wedge(), Pose.at(0.0, 0.0, 1.0), 0.15)
+    world = worlds.load(Scene("wedge", (wedge,), scenes.arm()))
+    touched = set()
+    for _ in range(40):
+        world.wait(0.02)
+        touched |= {first for first, second in world.contact_forces() if second == "body/wedge"}
+    assert any(name.startswith("link/") for name in touched)
 
 
 def test_slip_is_along_the_surface_whatever_its_direction() -> None:
