@@ -97,7 +97,10 @@ def kept(folder: Path) -> Accounts:
 
 def keep(folder: Path, title: str, account: Sequence[Carried]) -> None:
     """Write the account of a file into a run folder, beside those of others."""
-    every = kept(folder) | {title: tuple(account)}
+    before = kept(folder)
+    every = before | {title: tuple(account)}
+    if every == before:
+        return
     rows = [{"file": name, **line.to_wire()} for name, told in every.items() for line in told]
     write_whole(folder, LINES, "".join(json.dumps(row) + "\n" for row in rows).encode())
     pages = (markdown(name, told) for name, told in every.items())

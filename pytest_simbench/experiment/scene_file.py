@@ -78,8 +78,7 @@ def _reader(path: Path) -> SimulatorInfo:
     known = ", ".join(sorted({URDF, *(ending for info in infos for ending in info.reads)}))
     if ending in NOT_YET:
         raise DescriptionError(
-            f"{path}: {ending} files are not read yet; convert it to MJCF ({known}), by "
-            f"{NOT_YET[ending]}"
+            f"{path}: {ending} files are not read yet; convert it to MJCF, by {NOT_YET[ending]}"
         )
     raise DescriptionError(f"{path}: no engine here reads {ending or 'such'} files; give {known}")
 

@@ -139,7 +139,9 @@ class Scene(Wire):
                     "it, or give the scene a larger `room`"
                 )
         for a, b in combinations(self.bodies, 2):
-            if not (a.mass or b.mass) or self.kept_apart(f"body/{a.name}", f"body/{b.name}"):
+            if not (a.mass or b.mass):
+                continue
+            if self.apart and self.kept_apart(f"body/{a.name}", f"body/{b.name}"):
                 continue
             depth = penetration(a, b)
             if depth > OVERLAP_TOLERANCE:

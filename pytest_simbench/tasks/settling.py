@@ -171,7 +171,7 @@ def _rest(world: World) -> tuple[Motion, list[Forces]]:
     simulator does not tell them of this scene."""
     parts: list[Motion] = []
     forces: list[Forces] = []
-    began = world.time
+    began, told = world.time, True
     with world.phase("rest"):
         for k in range(1, LOOKS + 1):
             until = began + k * RESTLESS / LOOKS
@@ -179,8 +179,9 @@ def _rest(world: World) -> tuple[Motion, list[Forces]]:
             assert part is not None  # a log was asked for
             parts.append(part)
             try:
-                forces.append(world.contact_forces())
+                forces += [world.contact_forces()] if told else []
             except EngineFailed as error:
+                told = False
                 if error.remote != NotSupportedError.__name__:
                     raise
     return Motion.joined(parts), forces

@@ -12,6 +12,7 @@ from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.scene.pose import vector3
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.scenes import GRAVITY
 from pytest_simbench.testing.subject import Subject, require, require_close
 
 MOMENTS = (1.0e-3, 1.2e-3, 1.1e-3)
@@ -57,7 +58,7 @@ def pairs_have_their_friction(subject: Subject) -> None:
 
 def _slides(subject: Subject, own: float, other: float, rule: str) -> float:
     """Acceleration of a slab on a table by gravity that leans [m/s^2]."""
-    g = 9.80665 * math.sqrt(0.5)
+    g = GRAVITY * math.sqrt(0.5)
     slab = Box("slab", (0.2, 0.2, 0.04), Pose.at(0, 0, 0.12), 1.0, own)
     table = Box("table", (4.0, 1.0, 0.1), Pose.at(1.0, 0, 0.05), friction=other)
     scene = Scene("pair", (slab, table), None, (g, 0.0, -g), own, friction_rule=rule)

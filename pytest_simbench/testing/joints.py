@@ -11,7 +11,6 @@ import pytest
 
 from pytest_simbench.laws.mechanisms import STRONG, Part, Y, mechanism
 from pytest_simbench.scene import (
-    STANDARD_GRAVITY,
     Box,
     Closure,
     Coupling,
@@ -26,9 +25,8 @@ from pytest_simbench.scene.pose import vector3
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.scenes import GRAVITY as G
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
-
-G = -STANDARD_GRAVITY[2]
 
 MASS = 1.0
 """Of what moves on a joint here [kg]."""

@@ -24,6 +24,7 @@ from pytest_simbench.simulator import lazy_import
 
 from .actuators import Drive, drive_of
 from .constraints import Constraints
+from .shapes import hull_of, refused
 
 if TYPE_CHECKING:
     from .reading import Reading
@@ -197,10 +198,10 @@ class Tree:
         elif kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE):
             points, gap = rounded.capsule(a, b if kind == kinds.mjGEOM_CAPSULE else 0.0)
         elif kind == kinds.mjGEOM_MESH:
-            corners, own = self.reading.hull(geom)
+            corners, own = hull_of(self.reading, geom)
             points, gap, pose = np.array(corners), 0.0, pose * own
         else:
-            raise self.reading.refuse_shape(geom)
+            raise refused(self.reading, geom)
         if gap:
             self._coarse[link.name] = max(gap, self._coarse.get(link.name, 0.0))
         hull = Polytope(points)

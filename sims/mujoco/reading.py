@@ -14,41 +14,31 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
-from pytest_simbench.description.rounded import directions
 from pytest_simbench.description.urdf import ROOT
 from pytest_simbench.scene import (
     Body,
-    Box,
-    Capsule,
     Compound,
-    ConvexMesh,
-    Cylinder,
     FloatArray,
     Pose,
     Scene,
     SceneError,
-    Sphere,
     Start,
     Wrench,
-    principal,
 )
 from pytest_simbench.scene.checks import FORBIDDEN, RESERVED
-from pytest_simbench.scene.polytope import MOST
 from pytest_simbench.scene.pose import quaternion_of, vector3
 from pytest_simbench.scene.scene import ROOM
 from pytest_simbench.simulator import DescriptionError, lazy_import
 
 from .account import tell_the_rest, values_of
 from .articulated import MOUNT, OnJoint, Tree, on_joints
+from .shapes import shape_of
 from .touching import apart
 
 mujoco = lazy_import("mujoco")
 
 CLOSE = 1e-6
 """Share by which a body's centre and moments may be off those of its one shape."""
-
-CONCAVE = 1.02
-"""Volume of a hull over that of its mesh from which the mesh is told to be concave."""
 
 
 @dataclass(frozen=True)
@@ -218,7 +208,7 @@ class Reading:
         shapes = []
         for k, geom in enumerate(geoms):
             place = base.inverse() * self.geom_pose(geom)
-            shape, own = self.shape(geom, str(k), friction)
+            shape, own = shape_of(self, geom, str(k), friction)
             shapes.append(shape.moved_to(place * own))
         if not root:
             if len(shapes) == 1:
@@ -253,66 +243,6 @@ class Reading:
         )
         body = self._borne(self._damped(body, root, centre), root)
         return Placed(body, root, geoms, frame)
-
-    def shape(self, geom: int, name: str, friction: float) -> tuple[Body, Pose]:
-        """A shape, and its frame in that of its geom."""
-        model, kinds = self.model, mujoco.mjtGeom
-        a, b, c = (float(value) for value in model.geom_size[geom])
-        look: dict[str, Any] = {
-            "friction": friction,
-            "colour": tuple(map(float, model.geom_rgba[geom])),
-        }
-        match model.geom_type[geom]:
-            case kinds.mjGEOM_BOX:
-                return Box(name, (2 * a, 2 * b, 2 * c), Pose(), **look), Pose()
-            case kinds.mjGEOM_SPHERE:
-                return Sphere(name, a, Pose(), **look), Pose()
-            case kinds.mjGEOM_CYLINDER:
-                return Cylinder(name, a, 2 * b, Pose(), **look), Pose()
-            case kinds.mjGEOM_CAPSULE:
-                return Capsule(name, a, 2 * b, Pose(), **look), Pose()
-            case kinds.mjGEOM_MESH:
-                vertices, frame = self.hull(geom)
-                return ConvexMesh(name, vertices, Pose(), **look), frame
-        raise self.refuse_shape(geom)
-
-    def refuse_shape(self, geom: int) -> DescriptionError:
-        kind = mujoco.mjtGeom(self.model.geom_type[geom]).name.removeprefix("mjGEOM_").lower()
-        return self.refuse(
-            f"{self.name('geom', geom)} is of type {kind}, which no scene holds; make it a box, "
-            "sphere, cylinder, capsule or mesh"
-        )
-
-    def hull(self, geom: int) -> tuple[Any, Pose]:
-        """The corners of a mesh's convex hull in their frame, and that in the geom's."""
-        model, mesh, where = self.model, int(self.model.geom_dataid[geom]), self.name("geom", geom)
-        first = model.mesh_vertadr[mesh]
-        vertices = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(float)
-        points, graph = vertices, int(model.mesh_graphadr[mesh])
-        if graph >= 0:
-            count = int(model.mesh_graph[graph])
-            points = vertices[model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]]
-        if len(points) > MOST:
-            ways = directions(400)
-            corners = {int(k) for k in np.argmax(directions(MOST - 6) @ points.T, axis=1)}
-            corners |= {int(k) for sign in (1, -1) for k in np.argmax(sign * points, axis=0)}
-            kept = points[sorted(corners)[:MOST]]
-            gap = float(((ways @ points.T).max(axis=1) - (ways @ kept.T).max(axis=1)).max())
-            reason = f"{len(kept)} of {len(points)} corners; up to {1000 * gap:.2g} mm smaller"
-            self.tell("geom mesh (hull)", APPROXIMATED, reason, [where])
-            points = kept
-        corners_, frame = principal(points)
-        first = model.mesh_faceadr[mesh]
-        faces = vertices[model.mesh_face[first : first + model.mesh_facenum[mesh]]]
-        volume = abs(float(np.linalg.det(faces - vertices.mean(axis=0)).sum()) / 6)
-        hull = ConvexMesh("hull", corners_, Pose()).volume
-        if hull > CONCAVE * volume:
-            reason = (
-                f"it is concave: its hull has {hull / max(volume, 1e-12):.3g} times its volume; "
-                "MuJoCo collides the hull, too; coacd splits a mesh into convex ones"
-            )
-            self.tell("geom mesh (concave)", APPROXIMATED, reason, [where])
-        return corners_, frame
 
     def inertial(self, root: int) -> tuple[float, FloatArray, FloatArray]:
         """Mass [kg], centre of mass [m] and tensor of inertia about it [kg m^2] of a body and all
