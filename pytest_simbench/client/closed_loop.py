@@ -1,0 +1,334 @@
+"""A closed loop with a world, from this side: observations come, commands go."""
+
+from __future__ import annotations
+
+import contextlib
+import contextvars
+import inspect
+import json
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.client.errors import PolicyFailed, WorkerError
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.ground.errors import PolicyError
+from pytest_simbench.scene import Pose, Scene, SceneError
+from pytest_simbench.scene.checks import check_number
+from pytest_simbench.scene.policy import Function, Kinematics, Observation, Policy, Rhythm
+from pytest_simbench.scene.set_points import SetPoints, Sight
+from pytest_simbench.worker.wire import named
+
+PLAIN = (bool, int, float, str, bytes, type(None), list, tuple, dict, np.ndarray, np.generic)
+"""What a policy may hold that is to run inside the worker."""
+
+
+@dataclass(frozen=True)
+class Looking:
+    """What a policy is shown beside the state.
+
+    Attributes:
+        forces: contact forces.
+        picture: width and height of a picture [pixels]; None: none.
+    """
+
+    forces: bool = False
+    picture: tuple[int, int] | None = None
+
+
+class ClosedLoop:
+    """One loop under way: look, answer, look again, until it is over.
+
+    Args:
+        process: with a loaded scene.
+        scene: that scene.
+        rhythm: of the policy.
+        timestep: of the simulator [s].
+        seconds: of simulated time at most.
+        kinematics: of the robot.
+        looking: what is shown.
+        goal: of the task.
+
+    Attributes:
+        observation: the newest that the policy may see.
+        now: what the simulator's state is; newer where a delay was asked for.
+        answer: of the worker, once the loop is over.
+
+    Raises:
+        SceneError: no robot, or a rate, latency or delay that fits no time step.
+    """
+
+    def __init__(
+        self,
+        process: WorkerProcess,
+        scene: Scene,
+        rhythm: Rhythm,
+        *,
+        timestep: float,
+        seconds: float,
+        kinematics: Kinematics,
+        looking: Looking | None = None,
+        goal: Pose | None = None,
+    ) -> None:
+        every, late, self._old = rhythm.steps(timestep)
+        self._sight = Sight(scene, kinematics, goal)
+        looking = self._looking = looking or Looking()
+        self.answer: Mapping[str, Any] | None = None
+        self._seen: list[Observation] = []
+        self._questions = process.converse(
+            "close_loop", every=every, most=max(1, round(seconds * rhythm.rate)), late=late,
+            log_period=None, forces=looking.forces, picture=looking.picture, inside=None,
+        )  # fmt: skip
+        first = next(self._questions)
+        self._see(first)
+        told = self._sight.told(np.frombuffer(first, count=self._sight.numbers))
+        assert scene.robot is not None  # `Sight` has looked
+        self._points = SetPoints(scene.robot, told[0], told[2], 1 / rhythm.rate, kinematics)
+
+    def _see(self, question: bytes) -> None:
+        """Numbers of the state, then a picture, then forces, of what was asked for."""
+        end = 8 * self._sight.numbers
+        state = np.frombuffer(question, count=self._sight.numbers)
+        more: dict[str, Any] = {}
+        if self._looking.picture is not None:
+            width, height = self._looking.picture
+            begin, end = end, end + 3 * width * height
+            more["picture"] = np.frombuffer(question[begin:end], np.uint8).reshape(height, width, 3)
+        if self._looking.forces:
+            more["forces"] = {}
+            for first, second, numbers in json.loads(question[end:]):
+                wrench = np.array(numbers)
+                more["forces"] |= {(first, second): wrench, (second, first): -wrench}
+        self.now = self._sight.read(state, **more)
+        self._seen = [*self._seen, self.now][-1 - self._old :]
+        self.observation = self._seen[0]
+
+    def reply(self, answer: Any) -> bool:
+        """Send a policy's answer, and step until it is asked again; False: time is over.
+
+        Raises:
+            PolicyError: it is no command of this robot.
+            WorkerError: as `WorkerProcess.request`.
+        """
+        self._points.after(answer)
+        return self._send(np.concatenate([self._points.position, self._points.effort]).tobytes())
+
+    def end(self) -> None:
+        """No more answers."""
+        if self.answer is None:
+            self._send(None)
+
+    def _send(self, reply: bytes | None) -> bool:
+        try:
+            self._see(self._questions.send(reply))
+        except StopIteration as over:
+            self.answer = over.value
+            return False
+        return True
+
+    def close(self) -> None:
+        """End it, whatever state it is in."""
+        with contextlib.suppress(WorkerError):  # what ended it is told already
+            self._questions.close()
+
+
+def shipped(policy: Policy, seed: int, goal: Pose | None) -> dict[str, Any]:
+    """A policy as what a worker can run: its source and what it holds.
+
+    Raises:
+        PolicyError: its source is not there, or it holds what does not travel.
+    """
+    made: Any = policy._act if isinstance(policy, Function) else type(policy)
+    state = {} if isinstance(policy, Function) else dict(vars(policy))
+    try:
+        path = inspect.getsourcefile(made)
+        source = Path(path or "").read_text("utf-8")
+    except (OSError, TypeError) as error:
+        raise PolicyError(
+            f"the source of the policy {policy.name} cannot be read: {named(error)}"
+        ) from None
+    if "." in made.__qualname__:
+        raise PolicyError(
+            f"the policy {made.__qualname__} is not at the top of its module, and cannot run "
+            "inside the worker"
+        )
+    odd = sorted(name for name, value in state.items() if not isinstance(value, PLAIN))
+    if odd:
+        raise PolicyError(
+            f"the policy {policy.name} holds {', '.join(odd)}, which cannot go to the worker; only "
+            "numbers, texts, arrays, lists and dicts can"
+        )
+    told = None if goal is None else goal.as_array()
+    named_so = {"path": path, "source": source, "name": made.__name__}
+    return {**named_so, "state": state, "seed": seed, "goal": told}
+
+
+class Watched:
+    """Runs a policy in a thread of its own, so that one that stalls is told.
+
+    Attributes:
+        seconds: of wall time that the policy has taken.
+    """
+
+    def __init__(self, process: WorkerProcess, name: str) -> None:
+        self._process, self._name = process, name
+        self._since: float | None = None
+        self.seconds = 0.0
+
+    def ask(self, policy: Callable[..., Any], *arguments: Any) -> Any:
+        """The policy's answer.
+
+        Raises:
+            PolicyFailed: it raised; in its own words.
+        """
+        began = self._since = time.monotonic()
+        try:
+            return policy(*arguments)
+        except (WorkerError, PolicyError):
+            raise
+        except Exception as error:
+            line = error.__traceback__ and error.__traceback__.tb_next
+            at = (
+                f" ({Path(line.tb_frame.f_code.co_filename).name}:{line.tb_lineno})" if line else ""
+            )
+            raise self.failed(f"raised {named(error)}{at}") from error
+        finally:
+            self._since = None
+            self.seconds += time.monotonic() - began
+
+    def failed(self, how: str) -> PolicyFailed:
+        return PolicyFailed(f"the policy {self._name} {how}", self._process.where)
+
+    def run(self, work: Callable[[], None]) -> None:
+        """Carry out `work`, which asks; errors of it are raised here.
+
+        Raises:
+            PolicyFailed: the policy gave no answer within the limit of silence.
+        """
+        done, raised = threading.Event(), []
+        limit = self._process.launch.stall_timeout
+
+        def inner() -> None:
+            try:
+                work()
+            except BaseException as error:
+                raised.append(error)
+            finally:
+                done.set()
+
+        context = contextvars.copy_context()
+        threading.Thread(
+            target=context.run, args=(inner,), name="simbench-policy", daemon=True
+        ).start()
+        while not done.wait(min(limit, 1.0)):
+            since = self._since
+            if since is not None and time.monotonic() - since > limit:
+                self._process.kill()
+                raise self.failed(
+                    f"gave no answer for {limit:g} s (--sim-stall-timeout), and its repetition was "
+                    "ended"
+                )
+        if raised:
+            raise raised[0]
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A policy and how it is to be asked.
+
+    Attributes:
+        policy: whatever has `act`.
+        rhythm: how often, and how late.
+        until: simulated seconds, or what ends the loop once it holds of an observation.
+        at_most: seconds that the loop lasts if that never holds.
+        seed: of the episode.
+        looking: what the policy is shown beside the state.
+        inside: whether it runs in the worker.
+        goal: of the task.
+    """
+
+    policy: Any
+    rhythm: Rhythm
+    until: float | Callable[[Observation], bool]
+    at_most: float
+    seed: int
+    looking: Looking
+    inside: bool
+    goal: Pose | None
+
+    @property
+    def seconds(self) -> float:
+        """That it lasts at most.
+
+        Raises:
+            SceneError: no number above 0.
+        """
+        seconds = self.at_most if callable(self.until) else self.until
+        check_number(seconds, "the seconds of a closed loop", 0.0, above=True)
+        return float(seconds)
+
+    def inner(
+        self, process: WorkerProcess, scene: Scene, timestep: float, log_period: float | None
+    ) -> Mapping[str, Any]:
+        """Carry it out inside the worker; its answer."""
+        Sight(scene)  # there is a robot
+        every, late, old = self.rhythm.steps(timestep)
+        shown = [name for name, asked in vars(self.looking).items() if asked]
+        if callable(self.until) or old or shown:
+            what = (
+                "until=a function"
+                if callable(self.until)
+                else "observation_delay"
+                if old
+                else shown[0]
+            )
+            raise SceneError(f"a policy inside the worker takes no {what}")
+        most = max(1, round(self.seconds * self.rhythm.rate))
+        answer: Mapping[str, Any] = process.request(
+            "close_loop", every=every, most=most, late=late, log_period=log_period,
+            forces=False, picture=None, inside=shipped(self.policy, self.seed, self.goal),
+        )  # fmt: skip
+        return answer
+
+    def outer(
+        self, process: WorkerProcess, scene: Scene, timestep: float, kinematics: Kinematics
+    ) -> tuple[Mapping[str, Any], list[Observation], float]:
+        """Carry it out in this process.
+
+        Returns:
+            The worker's answer, the states at each observation, and the seconds that the policy
+            took.
+        """
+        watched = Watched(process, getattr(self.policy, "name", type(self.policy).__name__))
+        states: list[Observation] = []
+        loop: ClosedLoop | None = None
+
+        def work() -> None:
+            nonlocal loop
+            reset = getattr(self.policy, "reset", None)
+            if reset is not None:
+                watched.ask(reset, self.seed)
+            loop = ClosedLoop(
+                process, scene, self.rhythm, timestep=timestep, seconds=self.seconds,
+                kinematics=kinematics, looking=self.looking, goal=self.goal,
+            )  # fmt: skip
+            try:
+                going = True
+                while going and not (callable(self.until) and self.until(loop.observation)):
+                    going = loop.reply(watched.ask(self.policy.act, loop.observation))
+                    states.append(loop.now)
+                loop.end()
+            except PolicyError as error:
+                raise PolicyFailed(str(error), process.where) from error
+            finally:
+                loop.close()
+
+        watched.run(work)
+        assert loop is not None  # nothing was raised
+        assert loop.answer is not None
+        return loop.answer, states, watched.seconds
