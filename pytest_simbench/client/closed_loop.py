@@ -14,9 +14,8 @@ from pytest_simbench.client.errors import PolicyFailed, WorkerError
 from pytest_simbench.client.policies import Watched, shipped
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.ground.errors import PolicyError
-from pytest_simbench.scene import Pose, Scene, SceneError
-from pytest_simbench.scene.checks import check_number
-from pytest_simbench.scene.policy import Kinematics, Observation, Rhythm
+from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.scene.policy import Kinematics, LoopError, Observation, Rhythm, checked
 from pytest_simbench.scene.set_points import SetPoints, Sight
 
 
@@ -52,7 +51,7 @@ class ClosedLoop:
         answer: of the worker, once the loop is over.
 
     Raises:
-        SceneError: no robot, or a rate, latency or delay that fits no time step.
+        LoopError: no robot, or a rate, latency or delay that fits no time step.
     """
 
     def __init__(
@@ -164,11 +163,10 @@ class Episode:
         """That it lasts at most.
 
         Raises:
-            SceneError: no number above 0.
+            LoopError: no number above 0.
         """
         seconds = self.at_most if callable(self.until) else self.until
-        check_number(seconds, "the seconds of a closed loop", 0.0, above=True)
-        return float(seconds)
+        return checked(seconds, "the seconds of a closed loop", above=True)
 
     def inner(
         self, process: WorkerProcess, scene: Scene, timestep: float, log_period: float | None
@@ -178,7 +176,7 @@ class Episode:
         every, late, old = self.rhythm.steps(timestep)
         asked = {"until=a function": callable(self.until), "observation_delay": old}
         if refused := [name for name, value in {**asked, **vars(self.looking)}.items() if value]:
-            raise SceneError(f"a policy inside the worker takes no {refused[0]}")
+            raise LoopError(f"a policy inside the worker takes no {refused[0]}")
         most = max(1, round(self.seconds * self.rhythm.rate))
         answer: Mapping[str, Any] = process.request(
             "close_loop", every=every, most=most, late=late, log_period=log_period,

@@ -282,7 +282,7 @@ class World:
             The states at each observation, without the first.
 
         Raises:
-            SceneError: no robot, or a rate, latency or delay that fits no time step.
+            LoopError: no robot, or a rate, latency or delay that fits no time step.
             PolicyFailed: the policy raised, gave no answer, or one that is no command.
         """
         __tracebackhide__ = True

@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 
 from pytest_simbench.motion.model import RobotModel
-from pytest_simbench.scene import FloatArray, Pose, Scene, SceneError
+from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.scene.policy import LoopError
 
 ITERATIONS = 4
 """Of a step towards a pose at most."""
@@ -26,13 +27,13 @@ class Servo:
     """The `scene.policy.Kinematics` of a scene's robot.
 
     Raises:
-        SceneError: it has none.
+        LoopError: it has none.
         DescriptionError: its URDF cannot be read.
     """
 
     def __init__(self, scene: Scene) -> None:
         if scene.robot is None:
-            raise SceneError(f"scene {scene.name!r} has no robot that a policy could move")
+            raise LoopError(f"scene {scene.name!r} has no robot that a policy could move")
         self.model = RobotModel(scene.robot)
         self._gravity = np.array(scene.gravity, dtype=float)
         limits = scene.robot.limits

@@ -29,6 +29,7 @@ from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
+from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks.base import Task
 
 REFUSALS = (NotResumed, ExecutorError)
@@ -90,7 +91,7 @@ class RepeatFixture:
                 self._may_resume = True
             self.run.begin_lines()
             run = self.run
-            with failing(REFUSALS):
+            with failing((*REFUSALS, LoopError)):
                 repeater = Repeater(experiment, run.executor, run.progress, run.folder.append)
                 found |= {r.repetition: r for r in repeater.run(missing).records}
         return [found[k] for k in sorted(found)]

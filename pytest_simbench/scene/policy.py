@@ -20,6 +20,10 @@ from pytest_simbench.scene.checks import SceneError, check_number
 from pytest_simbench.scene.pose import FloatArray, Pose
 
 
+class LoopError(SceneError):
+    """A closed loop that cannot be: its rate, its delays, its end, or a scene without a robot."""
+
+
 class Kinematics(Protocol):
     """What a robot's model knows, where there is one (in pytest's process)."""
 
@@ -167,13 +171,13 @@ def as_policy(given: Any, rate: float | None = None) -> Any:
     """Whatever has `act`, or a function.
 
     Raises:
-        SceneError: it is neither.
+        LoopError: it is neither.
     """
     if callable(getattr(given, "act", None)) and not isinstance(given, type):
         return given
     if callable(given) and not isinstance(given, type):
         return Function(given, rate or Policy.rate)
-    raise SceneError(
+    raise LoopError(
         f"{given!r:.80} is no policy: give a function of an observation, or an object with "
         "act(observation), as of a subclass of Policy"
     )
@@ -194,34 +198,34 @@ class Rhythm:
     observation_delay: float = 0.0
 
     def __post_init__(self) -> None:
-        check_number(self.rate, "the rate [Hz] of a policy", 0.0, above=True)
-        check_number(self.command_latency, "the command_latency [s]", 0.0)
-        check_number(self.observation_delay, "the observation_delay [s]", 0.0)
+        checked(self.rate, "the rate [Hz] of a policy", above=True)
+        checked(self.command_latency, "the command_latency [s]")
+        checked(self.observation_delay, "the observation_delay [s]")
 
     def steps(self, timestep: float) -> tuple[int, int, int]:
         """Time steps of a period and of the latency, and periods of the delay.
 
         Raises:
-            SceneError: they are no whole numbers.
+            LoopError: they are no whole numbers.
         """
         period = 1.0 / self.rate
         every = _whole(period / timestep)
         if not every:
             n = max(1, int(period / timestep))
             near = " or ".join(f"{1 / (k * timestep):.6g} Hz" for k in (n, n + 1))
-            raise SceneError(
+            raise LoopError(
                 f"a policy at {self.rate:g} Hz is asked every {1e3 * period:.4g} ms, which is no "
                 f"multiple of the time step of {1e3 * timestep:.4g} ms; choose {near}, or "
                 "another time step"
             )
         late, old = _whole(self.command_latency / timestep), _whole(self.observation_delay / period)
         if late is None:
-            raise SceneError(
+            raise LoopError(
                 f"a command_latency of {self.command_latency:g} s is no multiple of the time step "
                 f"of {timestep:.6g} s"
             )
         if old is None:
-            raise SceneError(
+            raise LoopError(
                 f"an observation_delay of {self.observation_delay:g} s is no multiple of the "
                 f"policy's period of {period:.6g} s"
             )
@@ -230,3 +234,16 @@ class Rhythm:
 
 def _whole(number: float) -> int | None:
     return round(number) if abs(number - round(number)) < 1e-6 * max(1.0, number) else None
+
+
+def checked(value: Any, what: str, *, above: bool = False) -> float:
+    """A number from 0 on, or above 0.
+
+    Raises:
+        LoopError: it is none.
+    """
+    try:
+        check_number(value, what, 0.0, above=above)
+    except SceneError as error:
+        raise LoopError(str(error)) from None
+    return float(value)

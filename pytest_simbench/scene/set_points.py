@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pytest_simbench.ground.errors import PolicyError
-from pytest_simbench.scene.checks import SceneError
-from pytest_simbench.scene.policy import Command, Kinematics, Observation
+from pytest_simbench.scene.policy import Command, Kinematics, LoopError, Observation
 from pytest_simbench.scene.pose import FloatArray, Pose
 from pytest_simbench.scene.robot import FREE, Robot
 from pytest_simbench.scene.scene import Scene
@@ -153,7 +152,7 @@ class Sight:
     ) -> None:
         robot = scene.robot
         if robot is None:
-            raise SceneError(f"scene {scene.name!r} has no robot that a policy could move")
+            raise LoopError(f"scene {scene.name!r} has no robot that a policy could move")
         self.joints, self._kinematics, self._goal = len(robot.joints), kinematics, goal
         self._names = tuple(body.name for body in scene.free_bodies)
         columns = ("stiffness", "damping", "effort_limit")

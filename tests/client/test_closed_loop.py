@@ -22,8 +22,8 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.servo import Servo
-from pytest_simbench.scene import Pose, Scene, SceneError
-from pytest_simbench.scene.policy import Command, Observation, Policy
+from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.scene.policy import Command, LoopError, Observation, Policy
 from pytest_simbench.tasks import Reaching
 from pytest_simbench.tasks.base import cube
 from tests.client.waving import Waving, still
@@ -203,14 +203,14 @@ def test_a_worker_that_dies_is_told(world: Worlds) -> None:
 )
 def test_what_cannot_be_asked_for(world: Worlds, options: dict[str, Any], told: str) -> None:
     one = world()
-    with pytest.raises(SceneError, match=told):
+    with pytest.raises(LoopError, match=told):
         one.control(still, **{"until": 0.1, **options})
     one.control(still, until=0.1)
     assert one.time == pytest.approx(0.1)
 
 
 def test_without_a_robot_there_is_nothing_to_do(world: Worlds) -> None:
-    with pytest.raises(SceneError, match="has no robot that a policy could move"):
+    with pytest.raises(LoopError, match="has no robot that a policy could move"):
         world(replace(SCENE, robot=None)).control(still, until=0.1)
 
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from pytest_simbench.ground.errors import PolicyError
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.servo import FASTEST, Servo
-from pytest_simbench.scene import Box, Pose, Scene, SceneError
-from pytest_simbench.scene.policy import Command, Function, Policy, Rhythm, as_policy
+from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.scene.policy import Command, Function, LoopError, Policy, Rhythm, as_policy
 from pytest_simbench.scene.set_points import SetPoints, Sight, written
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5), mass=0.1)
@@ -43,13 +43,13 @@ def test_a_rhythm_of_whole_steps_is_told_in_steps(steps: int, timestep: float) -
     ],
 )
 def test_another_is_refused(rhythm: Rhythm, told: str) -> None:
-    with pytest.raises(SceneError, match=told):
+    with pytest.raises(LoopError, match=told):
         rhythm.steps(1 / 240)
 
 
 @pytest.mark.parametrize("given", [{"rate": 0.0}, {"rate": math.nan}, {"command_latency": -1.0}])
 def test_so_is_what_is_no_rhythm(given: dict[str, float]) -> None:
-    with pytest.raises(SceneError):
+    with pytest.raises(LoopError):
         Rhythm(**{"rate": 10.0, **given})
 
 
@@ -62,7 +62,7 @@ def test_what_is_a_policy() -> None:
     assert (made.name, made.rate) == ("nothing", 20.0)
     assert as_policy(made) is made
     for wrong in (3, "act", Policy):
-        with pytest.raises(SceneError, match="is no policy"):
+        with pytest.raises(LoopError, match="is no policy"):
             as_policy(wrong)
 
 
@@ -195,5 +195,5 @@ def test_efforts_are_those_of_the_drives() -> None:
 
 
 def test_without_a_robot_there_is_nothing_to_move() -> None:
-    with pytest.raises(SceneError, match="'one' has no robot that a policy could move"):
+    with pytest.raises(LoopError, match="'one' has no robot that a policy could move"):
         Sight(replace(SCENE, robot=None))
