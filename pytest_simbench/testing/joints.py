@@ -1,5 +1,5 @@
-"""Checks of what a joint does by itself (damping, friction, a spring, its rotor), of links that have
-a share of gravity or are held together, of joints that move together, of pairs kept apart."""
+"""Checks of what a joint does by itself (damping, friction, a spring, its rotor), of links that
+feel a share of gravity or are held together, of joints that move together, of pairs kept apart."""
 
 from __future__ import annotations
 
