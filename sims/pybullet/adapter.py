@@ -267,9 +267,9 @@ class PyBullet(Simulator):
         if self._pushed is not None:
             self._pushed.push()
         for link, force in self._borne.items():
-            place = pybullet.getLinkState(self._robot, link, physicsClientId=self.client)[0]
-            world = pybullet.WORLD_FRAME
-            pybullet.applyExternalForce(self._robot, link, force, place, world, self.client)
+            at = self._robot, link
+            place = pybullet.getLinkState(*at, physicsClientId=self.client)[0]
+            pybullet.applyExternalForce(*at, force, place, pybullet.WORLD_FRAME, self.client)
         if self._anchors is None:
             pybullet.stepSimulation(self.client)
         else:

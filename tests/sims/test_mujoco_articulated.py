@@ -382,7 +382,8 @@ def test_a_start_outside_of_the_range_is_its_nearest_end(kitchen: Path) -> None:
 @pytest.mark.parametrize("name", ADAPTERS)
 def test_every_engine_holds_drawer_and_arm(kitchen: Path, case: Case, name: str) -> None:
     """Parity holds, the servo holds its link, and a ball that falls into the drawer does not move
-    it from its stop."""
+    it from its stop. Links feel shares of gravity."""
+    borne(kitchen)
     scene = read_scene_file(kitchen).scene
     with (
         closing(SimulatorHandle(case_of(case, name))) as handle,
