@@ -4,7 +4,7 @@ its scene."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -117,6 +117,24 @@ def frames(prepared: PreparedRobot, closure: Closure) -> tuple[Pose, Pose]:
     poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
     turn = (poses[closure.second].inverse() * poses[closure.first]).quaternion
     return Pose(closure.first_point), Pose(closure.second_point, turn)
+
+
+def borne(
+    prepared: PreparedRobot, gravity: Sequence[float], felt: float = 1.0
+) -> dict[str, FloatArray]:
+    """What makes links feel their share of gravity, where it is not the whole: forces at their
+    centres of mass by name, in the world, (3,) each [N].
+
+    Args:
+        prepared: whose links they are.
+        gravity: of the scene [m/s^2].
+        felt: share that the engine lets these links feel.
+    """
+    return {
+        name: (share - felt) * prepared.links[name].mass * np.asarray(gravity)
+        for name, share in prepared.gravity.items()
+        if share != 1
+    }
 
 
 def joined(prepared: PreparedRobot) -> frozenset[frozenset[str]]:

@@ -135,6 +135,12 @@ class PreparedRobot:
                 )
 
     @property
+    def gravity(self) -> dict[str, float]:
+        """Share of the scene's gravity that each moving link feels, by its name."""
+        shares = {joint.name: joint.gravity for joint in self.robot.joints}
+        return {joint.child: shares[joint.name] for joint in self.joints}
+
+    @property
     def moving_links(self) -> list[Link]:
         return [self.links[joint.child] for joint in self.joints]
 

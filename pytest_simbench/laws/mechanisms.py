@@ -40,7 +40,7 @@ class Part:
         slides: a prismatic joint; else a hinge.
         stiffness, damping: of its drive, see `scene.Joint`; 0: the joint is free.
         effort: of its drive, at most [N m or N].
-        passive_damping, friction, spring, rest: of the joint itself, see `scene.Joint`.
+        passive_damping, friction, spring, rest, gravity: of the joint itself, see `scene.Joint`.
         shape: edges of a box about the centre of mass that collides [m]; None: nothing does.
         on: name of the part that it hangs on, or `MOUNT`; None: on the one before it.
     """
@@ -60,6 +60,7 @@ class Part:
     friction: float = 0.0
     spring: float = 0.0
     rest: float = 0.0
+    gravity: float = 1.0
     shape: Vector3 | None = None
     on: str | None = None
 
@@ -70,7 +71,8 @@ class Part:
     @property
     def drive(self) -> Joint:
         drive = (self.stiffness, self.damping, self.effort, 0.0, self.start)
-        return Joint(self.name, *drive, self.passive_damping, self.friction, self.spring, self.rest)
+        own = (self.passive_damping, self.friction, self.spring, self.rest, self.gravity)
+        return Joint(self.name, *drive, *own)
 
 
 def mechanism(

@@ -24,7 +24,7 @@ base is the link `base`, whose frame is the world's.
   shape at which it rests on others, 0 [m].
 - damping of a body or link: resistance to its linear and angular motion, (2,) [1/s], 0 of links.
   A body's own replaces that of the settings.
-- gravity of a body or link: the share of the scene's gravity that it feels, 1.
+- gravity of a body or link: the share of the scene's gravity that it feels; of a body 1.
 - dynamic: 1 if forces can move the body, else 0; a prescribed one is moved by none.
 - velocity: of the centre of mass, then angular, in the world frame, (6,) [m/s, rad/s].
 - touches: the shares of ground, bodies and links that it can collide with, (3,). Links collide
@@ -146,7 +146,6 @@ def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
     for pair in robot.couplings:
         quantities[f"coupling/{pair.follower}"] = np.array([pair.ratio, pair.offset])
     poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
-    moving = {link.name for link in prepared.moving_links}
     for link in prepared.links.values():
         prefix = f"link/{link.name}"
         quantities[f"{prefix}/pose"] = poses[link.name].as_array()
@@ -157,8 +156,9 @@ def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
         quantities |= named(prefix, **outlines(shapes))
         if link.shapes:
             quantities |= named(prefix, friction=robot.friction, restitution=0.0, margin=0.0)
-        if link.name in moving:
+        if link.name in prepared.gravity:
             quantities |= _inertial(prefix, link.mass, link.centre, link.inertia)
+            quantities[f"{prefix}/gravity"] = prepared.gravity[link.name]
     return quantities
 
 

@@ -137,6 +137,12 @@ class ReadBack(ABC):
         return self.bodies[rest] if kind == "body" else self.links[rest]
 
 
+def felt(force: FloatArray, mass: float, gravity: FloatArray) -> float:
+    """Share of gravity that a constant force on a link has it feel; gravity in [m/s^2]."""
+    gravity = np.asarray(gravity)
+    return float(force @ gravity / (mass * gravity @ gravity)) if gravity.any() else 0.0
+
+
 def one_value(values: Any) -> Any:
     """The number that all values are (frictions of a body's shapes, both ends of a force range).
 

@@ -52,9 +52,11 @@ class Joint(Wire):
             friction): it holds against what pulls less, and brakes what moves.
         spring: stiffness of a spring in the joint [N m/rad], or [N/m].
         rest: position at which that spring is without load [rad], or [m].
+        gravity: share of the scene's gravity that the link which it moves feels; 0: its weight is
+            compensated. At most 1: MuJoCo passes over more where no link has less.
     """
 
-    optional = ("passive_damping", "friction", "spring", "rest")
+    optional = ("passive_damping", "friction", "spring", "rest", "gravity")
 
     name: str
     stiffness: float
@@ -66,6 +68,7 @@ class Joint(Wire):
     friction: float = 0.0
     spring: float = 0.0
     rest: float = 0.0
+    gravity: float = 1.0
 
     def __post_init__(self) -> None:
         check_name(self.name, "a joint")
@@ -75,6 +78,8 @@ class Joint(Wire):
             check_number(getattr(self, quantity), what, 0.0, STIFFEST)
         check_number(self.initial_position, f"the initial position of joint {self.name!r}")
         check_number(self.rest, f"the rest position of the spring in joint {self.name!r}")
+        what = f"the share of gravity of the link on joint {self.name!r}"
+        check_number(self.gravity, what, most=1.0)
 
     @property
     def motor(self) -> bool:

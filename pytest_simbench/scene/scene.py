@@ -170,7 +170,7 @@ class Scene(Wire):
         """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `compound`,
         `file` (read from one), `frictions` (several), `restitution`, `damping`, `wrench`,
         `prescribed`, `loop`, `self_collide`, `apart`, and of joints `coupling`, `passive_damping`,
-        `joint_friction`, `spring`, `motor`."""
+        `joint_friction`, `spring`, `motor`, `link_gravity` (a share of it)."""
         bodies = self.bodies
         joints = () if self.robot is None else self.robot.joints
         found = {
@@ -188,6 +188,7 @@ class Scene(Wire):
             "joint_friction": any(joint.friction for joint in joints),
             "spring": any(joint.spring for joint in joints),
             "motor": any(joint.motor for joint in joints),
+            "link_gravity": any(joint.gravity != 1 for joint in joints),
         }
         kinds = {part.kind for body in bodies for part in (body, *body.parts)}
         return frozenset(kinds | {word for word, there in found.items() if there})

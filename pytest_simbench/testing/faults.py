@@ -267,6 +267,8 @@ def robot_faults(robot: Robot) -> dict[str, Fault]:
                            with_own(middle, friction=2.0), None, "joint_friction"),
         "spring": (f"{middle} has a spring beside its drive", f"{drive}/stiffness",
                    with_own(middle, spring=70.0), None, "spring"),
+        "link_gravity": (f"{moved} feels half of gravity", f"{of_link}/gravity",
+                         with_own(middle, gravity=0.5), None, "link_gravity"),
         "initial_position": (f"{middle} starts 10 mrad farther", f"{drive}/initial_position",
                              of_joints(middle, farther=0.01)),
     }  # fmt: skip

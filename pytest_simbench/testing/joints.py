@@ -1,5 +1,5 @@
-"""Checks of what a joint does by itself (damping, friction, a spring, its rotor), of links that are
-held together, of joints that move together and of pairs that are kept apart."""
+"""Checks of what a joint does by itself (damping, friction, a spring, its rotor), of links that
+feel a share of gravity or are held together, of joints that move together, of pairs kept apart."""
 
 from __future__ import annotations
 
@@ -171,6 +171,21 @@ def joints_have_springs(subject: Subject) -> None:
     excused = subject.cls.info.deviations
     if not any(d.excuses(f"joint/{driven.name}/stiffness") for d in excused):
         moves_by(subject, driven, law=lambda q, v: -G + (200 * (0.1 - q) - 200 * q) / MASS)
+
+
+@check()
+def links_feel_their_share_of_gravity(subject: Subject) -> None:
+    """A mass on a slider stays, and a lever, where their weight is compensated. With half of it
+    both fall half as fast, and a mass on the slider, which feels the whole, as much faster."""
+    declared(subject, "link_gravity")
+    held(subject, slider("borne slider", gravity=0.0))
+    held(subject, lever("borne lever", gravity=0.0))
+    half = lever("light lever", gravity=0.5)
+    moves_by(subject, half, law=lambda q, v: turning(q) / 2 / ABOUT_AXIS)
+    pair = slider("light slider", gravity=0.5), slider("heavy slider")
+    way = moves_by(subject, *pair, law=lambda q, v: -G / 2)
+    gap = float(np.abs(way[:, 1] - way[:, 0]).max())
+    require_close("way of a heavy slider on a light one", gap, 0.0, 0.02 * G / 4 * SECONDS**2, "m")
 
 
 @check(Capability.COUPLINGS)

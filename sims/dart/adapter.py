@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.links import ends, reduced
+from pytest_simbench.description.links import borne, ends, reduced
 from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     FOLLOWER,
@@ -123,6 +123,7 @@ class DART(Simulator):
         self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
         self._robot: Any = None
         self._couplings: Couplings | None = None
+        self._borne: list[tuple[Any, FloatArray]] = []
         self._base = np.empty(0)
         if self.prepared is not None:
             self._load_robot(self.prepared)
@@ -207,6 +208,10 @@ class DART(Simulator):
                 place, _ = ends(prepared, closure)
                 held = dartpy.constraint.BallJointConstraint(*bodies, place)
             self.world.getConstraintSolver().addConstraint(held)
+        for name, force in borne(prepared, self.scene.gravity, felt=0.0).items():
+            skeleton.getBodyNode(name).setGravityMode(False)
+            self._borne.append((skeleton.getBodyNode(name), force))
+        self._bear()
         self._error_gain = np.zeros(len(names))
         self._error_gain[self._index] = self._gain
         self.command(initial, 0 * initial, 0 * initial)
@@ -242,6 +247,12 @@ class DART(Simulator):
                 self._couplings.push()
             self._robot.setCommands(self._base - self._error_gain * self._robot.getPositions())
         self.world.step(False)
+        self._bear()
+
+    def _bear(self) -> None:
+        """Pull at links that feel a share of gravity. A force lasts, and turns with its link."""
+        for body, force in self._borne:
+            body.setExtForce(force, body.getLocalCOM(), False, True)
 
     @property
     def time(self) -> float:
@@ -274,6 +285,7 @@ class DART(Simulator):
             skeleton.setPositions(q)
             skeleton.setVelocities(v)
             skeleton.setAccelerations(a)
+        self._bear()
         self.world.getConstraintSolver().clearLastCollisionResult()
 
     def _all(self) -> list[Any]:

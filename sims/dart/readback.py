@@ -14,7 +14,7 @@ import numpy as np
 
 from pytest_simbench.description.shapes import DIRECTIONS, box_reach, cylinder_reach, round_reach
 from pytest_simbench.parity import readback
-from pytest_simbench.parity.readback import one_value
+from pytest_simbench.parity.readback import felt, one_value
 from pytest_simbench.scene import Coupling, FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
@@ -78,12 +78,15 @@ class ReadBack(readback.ReadBack):
         }
 
     def inertial(self, part: Any) -> dict[str, Any]:
-        inertia = part.getInertia()
+        inertia, gravity = part.getInertia(), self.made.getGravity()
+        pull = 0.0
+        if part.getName() in self.links:  # bodies are pushed otherwise
+            pull = felt(part.getExternalForceGlobal()[3:], inertia.getMass(), gravity)
         return {
             "mass": inertia.getMass(),
             "com": inertia.getLocalCOM(),
             "inertia": inertia.getMoment(),
-            "gravity": float(part.getGravityMode()),
+            "gravity": part.getGravityMode() + pull,
         }
 
     def body(self, part: Any, name: str) -> dict[str, Any]:

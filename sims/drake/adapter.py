@@ -102,8 +102,9 @@ class Drake(Simulator):
         for box, body in zip(scene.free_bodies, free, strict=True):
             self.plant.SetFreeBodyPose(self.context, body, transform(box.pose))
         self._joints_at = np.empty((2, 0), dtype=int)
-        if scene.robot is not None:
-            self._start_drives(scene.robot)
+        if self.prepared is not None:
+            self._start_drives(self.prepared.robot)
+            self.world.bear(self.prepared, self.context)
         nq = self.plant.num_positions()
         joints = [self.world.floating_joint(body) for body in free]
         q = np.array([joint.position_start() for joint in joints], int).reshape(-1, 1)

@@ -17,7 +17,7 @@ from pytest_simbench.description.shapes import (
     round_reach,
 )
 from pytest_simbench.parity import readback
-from pytest_simbench.parity.readback import one_value
+from pytest_simbench.parity.readback import felt, one_value
 from pytest_simbench.scene import Body, Coupling, FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import
 
@@ -151,12 +151,16 @@ class ReadBack(readback.ReadBack):
         inertia = part.body.CalcSpatialInertiaInBodyFrame(self.context)
         com = inertia.get_com()
         central = inertia.Shift(com).CalcRotationalInertia()
-        enabled = self.plant.gravity_field().is_enabled(part.body.model_instance())
+        field, port = self.plant.gravity_field(), self.plant.get_applied_spatial_force_input_port()
+        pulls = port.Eval(self.context) if port.HasValue(self.context) else ()
+        own = (pull for pull in pulls if pull.body_index == part.body.index())
+        force = sum((pull.F_Bq_W.translational() for pull in own), np.zeros(3))
+        share = felt(force, inertia.get_mass(), field.gravity_vector())
         return {
             "mass": inertia.get_mass(),
             "com": com,
             "inertia": central.CopyToFullMatrix3(),
-            "gravity": float(enabled),
+            "gravity": field.is_enabled(part.body.model_instance()) + share,
         }
 
     def surface(self, part: Part) -> dict[str, Any]:

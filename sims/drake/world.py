@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.links import OPEN, ends, frames, joined, reduced
+from pytest_simbench.description.links import OPEN, borne, ends, frames, joined, reduced
 from pytest_simbench.description.shapes import mesh_points
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape
 from pytest_simbench.scene import (
@@ -34,6 +34,7 @@ eigen = lazy_import("pydrake.common.eigen_geometry")
 geometry = lazy_import("pydrake.geometry")
 math = lazy_import("pydrake.math")
 plants = lazy_import("pydrake.multibody.plant")
+spatial = lazy_import("pydrake.multibody.math")
 trees = lazy_import("pydrake.multibody.tree")
 
 GREY = (0.5, 0.5, 0.5, 1.0)
@@ -97,6 +98,16 @@ class World:
             for index in plant.GetJointIndices()
             if plant.get_joint(index).child_body().index() == body.index()
         )
+
+    def bear(self, prepared: PreparedRobot, context: Any) -> None:
+        """Pull at links that feel a share of gravity, from now on."""
+        pulls = []
+        for name, force in borne(prepared, self.scene.gravity).items():
+            pull, link = plants.ExternallyAppliedSpatialForce(), self.links[name]
+            pull.body_index, pull.p_BoBq_B = link.index(), link.default_com()
+            pull.F_Bq_W = spatial.SpatialForce(tau=np.zeros(3), f=force)
+            pulls.append(pull)
+        self.plant.get_applied_spatial_force_input_port().FixValue(context, pulls)
 
     def _options(self) -> Any:
         s = self.settings

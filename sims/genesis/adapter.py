@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pytest_simbench.description.links import borne
 from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
@@ -112,13 +113,13 @@ class Genesis(Simulator):
         options = dataclasses.replace(  # what is data, not code
             self.settings, timestep=1.0, substeps=1, constraint_timeconst=1.0, impedance=(0.9, 0.95)
         )
-        forces = scene.words & {"wrench"}  # whose kernels are others
+        forces = scene.words & {"wrench", "link_gravity"}  # whose kernels are others
         robot = None if scene.robot is None else scene.robot.self_collide
         kind = (options, several, robot, bool(scene.free_bodies), forces)
         if kind in self.compiled:
             return
         self.load(scene)
-        if forces:
+        if "wrench" in forces:
             self.push(np.zeros((len(self._free), 6)))
         self.step()
         self.body_state()
@@ -135,6 +136,7 @@ class Genesis(Simulator):
         start_engine(self.settings.precision)
         self.world = new_world(scene, self.settings, window=self.gui)
         self._dofs: list[int] = []
+        self._borne: tuple[list[int], list[FloatArray]] = [], []
         if isinstance(self.settings, GenesisFileSettings):
             self._load_file(scene)
         else:
@@ -163,8 +165,11 @@ class Genesis(Simulator):
         self._free = [self._boxes[box.name].links[0].idx for box in scene.free_bodies]
         self._led = [self._boxes[box.name].links[0] for box in scene.prescribed_bodies]
         self._start_bodies(scene)
-        if scene.robot is not None:
-            self._set_drives(scene.robot)
+        if self.prepared is not None:
+            self._set_drives(self.prepared.robot)
+            forces = borne(self.prepared, scene.gravity)
+            self._borne = [self._robot.get_link(name).idx for name in forces], [*forces.values()]
+            self._bear()
 
     def _set_contacts(self, scene: Scene) -> None:
         """Impedance of contacts, and frictions that a material refuses."""
@@ -254,6 +259,12 @@ class Genesis(Simulator):
         solver.apply_links_external_force(force, self._free, ref=centre_of_mass())
         solver.apply_links_external_torque(torque, self._free, ref=centre_of_mass())
 
+    def _bear(self) -> None:
+        """Pull at links that feel a share of gravity, in the next step."""
+        links, forces = self._borne
+        if links:
+            self.solver.apply_links_external_force(forces, links, ref=centre_of_mass())
+
     def lead(self, before: FloatArray, after: FloatArray) -> None:
         for link, row in zip(self._led, before, strict=True):
             spin = rotation_matrix(row[3:7]).T @ row[10:]
@@ -262,6 +273,7 @@ class Genesis(Simulator):
 
     def step(self) -> None:
         self.world.step(update_visualizer=False)
+        self._bear()
         self._steps += 1
 
     def body_state(self) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pytest_simbench.description.shapes import box_reach, cylinder_reach, placed, reach, round_reach
 from pytest_simbench.parity import readback
-from pytest_simbench.parity.readback import one_value
+from pytest_simbench.parity.readback import felt, one_value
 from pytest_simbench.scene import Coupling, FloatArray, Pose, rotation_matrix
 from pytest_simbench.simulator import heavy, lazy_import
 
@@ -118,11 +118,15 @@ class ReadBack(readback.ReadBack):
         axes = rotation_matrix(self._array("links", "inertial_quat")[part.idx])
         tensor = self._array("links", "inertial_i")[part.idx].astype(float)
         entity = self._array("links", "entity_idx")[part.idx]
+        mass = self._array("links", "inertial_mass")[part.idx]
+        gravity = array_of(self.solver.rigid_info.gravity).reshape(3)
+        pull = -array_of(self.solver.dyn_state.links.cfrc_applied_vel)[part.idx].reshape(3)
+        held = self._array("entities", "gravity_compensation")[entity]
         return {
-            "mass": self._array("links", "inertial_mass")[part.idx],
+            "mass": mass,
             "com": self._array("links", "inertial_pos")[part.idx],
             "inertia": axes @ tensor @ axes.T,
-            "gravity": 1.0 - self._array("entities", "gravity_compensation")[entity],
+            "gravity": 1.0 - held + felt(pull, mass, gravity),
         }
 
     def _velocity(self, link: Any) -> FloatArray:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pytest_simbench.description import rounded
-from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED
+from pytest_simbench.description.carried import APPROXIMATED, CARRIED
 from pytest_simbench.description.robot_files import digest, keep
 from pytest_simbench.description.stl import written_stl
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape, write_joint, write_link
@@ -240,6 +240,7 @@ class Tree:
             friction=float(model.dof_frictionloss[dof]),
             spring=float(np.ravel(model.jnt_stiffness[joint])[0]),
             rest=float(model.qpos_spring[at] - model.qpos0[at]),
+            gravity=1.0 - self.reading.compensated(link.body),
         )
 
     def _tell(self, frictions: FloatArray) -> None:
@@ -249,9 +250,9 @@ class Tree:
         tell(told, CARRIED, f"{len(names)} hinges and sliders", names)
         borne = [b for b in range(1, self.model.nbody) if self.reading.root(b) in self._bodies]
         if self.model.body_gravcomp[borne].any():
-            reason = "every link of a scene has its whole weight"
+            reason = "links feel the rest of gravity"
             names = [self.reading.name("body", b) for b in borne if self.model.body_gravcomp[b]]
-            tell("body gravcomp (of links)", NOT_CARRIED, reason, names)
+            tell("body gravcomp (of links)", CARRIED, reason, names)
         if frictions.min() < frictions.max():
             reason = f"links have one friction: the largest of {sorted(set(frictions.tolist()))}"
             tell("geom friction (sliding)", APPROXIMATED, reason)

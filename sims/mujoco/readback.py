@@ -311,7 +311,11 @@ def _link_of(links: Mapping[int, str], model: Any, body: int) -> str:
 
 def joint_wrenches(model: Any, data: Any, at: Numbers) -> FloatArray:
     """Of the driven joints, on the links below about their origins, (n_joints, 6)."""
+    applied = data.xfrc_applied.copy()  # of which MuJoCo knows here, and not of gravcomp
+    lifted = (model.body_gravcomp * model.body_mass)[:, None] * model.opt.gravity
+    data.xfrc_applied[:, :3] -= lifted
     mujoco.mj_rnePostConstraint(model, data)
+    data.xfrc_applied[:] = applied
     bodies = model.jnt_bodyid[list(at.joints.values())]
     torque, force = np.hsplit(data.cfrc_int[bodies], 2)
     centres = data.subtree_com[model.body_rootid[bodies]]  # which MuJoCo's torques are about

@@ -68,6 +68,7 @@ class Reading:
     Attributes:
         model, data: compiled, at its start.
         ground: number of the plane that is the ground; None: the file has none.
+        falls: whether gravity acts.
         lift: height by which the scene is moved up [m].
         placed: all bodies of the scene.
         scene: that the file makes.
@@ -86,6 +87,8 @@ class Reading:
         self.data = data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         self._names: dict[str, int] = {ROOT: 0, MOUNT: 0}
+        off = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
+        self.falls = bool(model.opt.gravity.any() and not off)
         masks = model.geom_contype | model.geom_conaffinity
         self.solid = np.flatnonzero(masks).tolist()
         self.ground = self._find_ground()
@@ -262,20 +265,24 @@ class Reading:
 
     def _borne(self, body: Body, root: int) -> Body:
         """With the force that compensates its gravity."""
-        model = self.model
-        own = [b for b in range(1, model.nbody) if self.root(b) == root]
-        shares = model.body_gravcomp[own]
-        if not shares.any():
+        share = self.compensated(root)
+        if not share:
             return body
-        masses = model.body_mass[own]
-        if np.ptp(shares[masses > 0]) > CLOSE:
-            reason = "its parts are borne by different shares of their weight, here by none"
-            self.tell("body gravcomp (of parts)", NOT_CARRIED, reason, [body.name])
-            return body
-        reason = f"a force of {shares.max():.4g} of its weight bears it"
+        reason = f"a force of {share:.4g} of its weight bears it"
         self.tell("body gravcomp", CARRIED, reason, [body.name])
-        force = vector3(-float(shares @ masses) * model.opt.gravity)
+        force = vector3(-share * body.mass * self.model.opt.gravity)
         return body.changed(wrenches=(Wrench(force=force),))
+
+    def compensated(self, root: int) -> float:
+        """Share of its gravity that is compensated, of a body and all that is fixed on it."""
+        model = self.model
+        own = [b for b in range(1, model.nbody) if self.root(b) == root and model.body_mass[b] > 0]
+        shares, masses = model.body_gravcomp[own], model.body_mass[own]
+        share = float(shares @ masses / masses.sum())
+        if np.ptp(shares) > CLOSE:
+            reason = f"its parts have different shares, here all {share:.4g}, the mean"
+            self.tell("body gravcomp (of parts)", APPROXIMATED, reason, [self.name("body", root)])
+        return share if self.falls else 0.0
 
     def _damped(self, body: Body, root: int, centre: FloatArray) -> Body:
         """With the damping of its free joint."""
@@ -321,12 +328,11 @@ class Reading:
         self.tree = tree = Tree(self, self.links)
         free = [p.body.pose.position for p in self.placed if p.root]
         room = np.maximum(ROOM, 2 * np.abs(free).max(axis=0, initial=0.0) if free else 0.0)
-        off = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
         self.scene = Scene(
             Path(self.path).stem.strip(" .") or "scene",
             tuple(p.body for p in self.placed),
             tree.robot(self.lift, together) if self.links else None,
-            gravity=(0.0, 0.0, 0.0) if off else vector3(model.opt.gravity),
+            gravity=vector3(model.opt.gravity) if self.falls else (0.0, 0.0, 0.0),
             ground_friction=friction,
             room=vector3(room),
             apart=pairs,

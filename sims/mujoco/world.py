@@ -69,6 +69,8 @@ def _equip(spec: Any, prepared: PreparedRobot, settings: MuJoCoSettings) -> None
         geom.rgba = LINK_COLOUR
     for joint in robot.joints:
         _add_drive(spec, joint)
+    for body in spec.bodies:
+        body.gravcomp = 1.0 - prepared.gravity.get(body.name, 1.0)
     for pair in (*robot.gripper.couplings, *robot.couplings):
         _couple(spec, pair)
     close_loops(spec, prepared)

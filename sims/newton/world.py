@@ -120,6 +120,8 @@ def _add_robot(builder: Any, prepared: PreparedRobot, surface: Any) -> None:
     for joint in robot.joints:
         _set_drive(builder, joints.index(joint.name), joint)
     links = names(builder.body_label)
+    shares = {links.index(name): 1.0 - share for name, share in prepared.gravity.items()}
+    builder.custom_attributes["mujoco:gravcomp"].values = shares
     for closure in reduced(prepared):
         first, second = links.index(closure.first), links.index(closure.second)
         if closure.rigid:  # a weld's data begin with the point of what it names second

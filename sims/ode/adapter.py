@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.links import joined, reduced
+from pytest_simbench.description.links import borne, joined, reduced
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
@@ -113,6 +113,7 @@ class ODE(Simulator):
         self._links: dict[str, Part] = {}
         self._axes: dict[str, Axis] = {}
         self._closures: list[Any] = []
+        self._borne: list[tuple[Any, FloatArray]] = []
         self._drives: Drives | None = None
         if self.prepared is not None:
             self._load_robot(self.prepared)
@@ -138,7 +139,16 @@ class ODE(Simulator):
             build.close_loop(self.world, prepared, self._links, closure)
             for closure in reduced(prepared)
         ]
+        for name, force in borne(prepared, self.scene.gravity, felt=0.0).items():
+            self._links[name].body.setGravityMode(False)
+            self._borne.append((self._links[name].body, force))
+        self._bear()
         self._drives = Drives(self.world, robot, self._axes, s.timestep, s.drive, s.position_gain)
+
+    def _bear(self) -> None:
+        """Pull at links that feel a share of gravity, in the next step."""
+        for body, force in self._borne:
+            body.addForce(force)
 
     def _part(self, name: str) -> Part:
         """Of "ground", `body/NAME` or `link/NAME`."""
@@ -176,6 +186,7 @@ class ODE(Simulator):
         self._advance(self.settings.timestep)
         if self._drives is not None:
             self._drives.rest()
+        self._bear()
         self._steps += 1
 
     def body_state(self) -> FloatArray:

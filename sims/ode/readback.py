@@ -18,6 +18,7 @@ from pytest_simbench.description.shapes import (
     round_reach,
 )
 from pytest_simbench.parity import readback
+from pytest_simbench.parity.readback import felt
 from pytest_simbench.scene import Coupling, FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
@@ -106,11 +107,12 @@ class ReadBack(readback.ReadBack):
 
     def inertial(self, part: Part) -> dict[str, Any]:
         mass, frame = part.body.getMass(), part.frame.inverse()
+        force = np.array(part.body.getForce())
         return {
             "mass": mass.mass,
             "com": placed(np.array([mass.c]), frame)[0],
             "inertia": frame.rotation() @ np.array(mass.I) @ frame.rotation().T,
-            "gravity": float(part.body.getGravityMode()),
+            "gravity": part.body.getGravityMode() + felt(force, mass.mass, self.made.getGravity()),
             "damping": damping(part.body) / self.timestep,
         }
 

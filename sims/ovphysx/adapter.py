@@ -25,12 +25,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.description.links import link_poses
+from pytest_simbench.description.links import borne, link_poses
 from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.scene.pose import vector3
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
     NotSupportedError,
+    PreparedRobot,
     Simulator,
     SimulatorInfo,
     lazy_import,
@@ -85,6 +87,12 @@ class OvPhysX(Simulator):
                 "limit bounds both, of a drive that is free none",
                 within=usd.BOUNDLESS,
                 only="spring",
+            ),
+            Deviation(
+                "link/*/gravity",
+                "PhysX reports whether gravity acts: a share of it is a force of each step",
+                within=1.0,
+                only="link_gravity",
             ),
             Deviation("body/*/damping link/*/damping", "PhysX reports no damping of bodies"),
             Deviation("body/*/dynamic", "PhysX does not report which bodies are kinematic"),
@@ -145,9 +153,12 @@ class OvPhysX(Simulator):
         self._joints: list[str] = []
         self._unit = np.empty(0)
         self._placed: dict[str, Pose] = {}
+        self._borne: dict[str, FloatArray] = {}
         if self.prepared is not None:
             robot = self.prepared.robot
             self._joints = [usd.joint_path(i) for i in range(len(robot.joints))]
+            forces = borne(self.prepared, scene.gravity, felt=0.0)
+            self._borne = {name: force for name, force in forces.items() if force.any()}
             self._springs = robot.column("spring") if "spring" in scene.words else None
             self._rests = robot.column("rest")
             self._stiffness = robot.column("stiffness") + robot.column("spring")
@@ -213,11 +224,23 @@ class OvPhysX(Simulator):
             targets = {path: row[columns] for path, row in rows.items()}
             self.session.write("RIGID_BODY", f"kinematicTarget{name}", targets)
 
+    def _bear(self, prepared: PreparedRobot) -> None:
+        """Pull at links that feel a share of gravity, in the next step."""
+        joints = zip(prepared.robot.joint_names, self.joint_state()[0], strict=True)
+        poses, links = link_poses(prepared, dict(joints)), list(prepared.links)
+        rows = {}
+        for name, force in self._borne.items():
+            at = poses[name] * Pose(vector3(prepared.links[name].centre))
+            rows[usd.link_path(links.index(name))] = [*force, 0.0, 0.0, 0.0, *at.position]
+        self.session.write("ARTICULATION_LINK", "wrench", rows)
+
     def step(self) -> None:
         if self._steps == 0 and self._targets is not None:
             for kind, values in zip(("Position", "Velocity"), self._targets, strict=True):
                 given = zip(self._joints, values / self._unit, strict=True)
                 self.session.write("ARTICULATION_JOINT", f"joint{kind}Target", dict(given))
+        if self._borne and self.prepared is not None:
+            self._bear(self.prepared)
         self.session.physx.step_sync(self.settings.timestep)
         self._steps += 1
         if self._steps == 1 and self._joints:

@@ -204,6 +204,7 @@ class Stage:
 
     def _robot(self, prepared: PreparedRobot) -> list[str]:
         robot, names = prepared.robot, list(prepared.links)
+        self._shares = prepared.gravity
         poses = {prepared.root: Pose()}
         for joint in prepared.joints:
             poses[joint.child] = poses[joint.parent] * joint.origin
@@ -230,6 +231,8 @@ class Stage:
 
     def _link(self, link: Link, pose: Pose, friction: float) -> str:
         lines = [*usd.placed(pose), *self._lines["physxRigidBody"]]
+        if self._shares.get(link.name, 1.0) != 1:  # what it feels is a force of each step
+            lines += usd.attributes("physxRigidBody", {"disableGravity": True})
         if link.mass > 0:
             lines += usd.mass_lines(link.mass, link.centre, link.inertia)
         shapes = [self._shape(i, shape, friction) for i, shape in enumerate(link.shapes)]

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.description.links import frames, joined, motion_subspace, reduced
+from pytest_simbench.description.links import borne, frames, joined, motion_subspace, reduced
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
@@ -142,6 +142,7 @@ class PyBullet(Simulator):
         self._robot = -1
         self._anchors: Anchors | None = None
         self._pushed: Pushed | None = None
+        self._borne: dict[int, FloatArray] = {}
         self._couplings: list[int] = []
         self._closures: list[int] = []
         self._joints: list[int] = []
@@ -214,6 +215,8 @@ class PyBullet(Simulator):
             for joint in robot.joints
             if joint.friction
         ]
+        forces = borne(prepared, self.scene.gravity)
+        self._borne = {self._links[name]: force for name, force in forces.items()}
         if any(joint.spring or joint.passive_damping or joint.motor for joint in robot.joints):
             step = self.settings.timestep
             self._pushed = Pushed(c, self._robot, self._joints, robot, step)
@@ -263,6 +266,10 @@ class PyBullet(Simulator):
     def step(self) -> None:
         if self._pushed is not None:
             self._pushed.push()
+        for link, force in self._borne.items():
+            at = self._robot, link
+            place = pybullet.getLinkState(*at, physicsClientId=self.client)[0]
+            pybullet.applyExternalForce(*at, force, place, pybullet.WORLD_FRAME, self.client)
         if self._anchors is None:
             pybullet.stepSimulation(self.client)
         else:

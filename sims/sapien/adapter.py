@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.description.links import frames, reduced
+from pytest_simbench.description.links import borne, frames, reduced
 from pytest_simbench.scene import Closure, FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
@@ -73,6 +73,12 @@ class SAPIEN(Simulator):
                 within=5e-4,
                 elsewhere=1e-3,
             ),
+            Deviation(
+                "link/*/gravity",
+                "SAPIEN tells whether gravity acts: a share of it is a force of each step",
+                within=1.0,
+                only="link_gravity",
+            ),
             Deviation("", "a cylinder is a prism, which loses speed as it rolls", only="cylinder"),
             Deviation(
                 "",
@@ -114,6 +120,7 @@ class SAPIEN(Simulator):
         self._own: list[list[Any]] = []
         self._links: dict[str, Any] = {}
         self._closures: list[Any] = []
+        self._borne: list[tuple[Any, FloatArray]] = []
         if self.prepared is not None:
             self._load_robot(self.prepared, groups)
 
@@ -166,6 +173,10 @@ class SAPIEN(Simulator):
         for pair in (*robot.gripper.couplings, *robot.couplings):
             couple(self._robot, pair, self.settings.coupling_stiffness)
         self._closures = [self._close(prepared, closure) for closure in reduced(prepared)]
+        for name, force in borne(prepared, self.scene.gravity, felt=0.0).items():
+            self._links[name].disable_gravity = True
+            if force.any():
+                self._borne.append((self._links[name], force))
         initial = np.empty(len(order))
         initial[self._order] = robot.column("initial_position")
         self._robot.set_qpos(initial)
@@ -223,6 +234,8 @@ class SAPIEN(Simulator):
             body.kinematic_target = sapien.Pose(row[:3], row[3:7])
 
     def step(self) -> None:
+        for link, force in self._borne:
+            link.add_force_torque(force.astype(np.float32), np.zeros(3, np.float32))
         self._system.step()
         self._steps += 1
 

@@ -89,6 +89,8 @@ JOINT = Joint("j", 1.0, 1.0, 1.0, 0.1, 0.0)
         ({"stiffness": -1.0}, "the stiffness of joint 'j' is -1.0"),
         ({"damping": NAN}, "the damping of joint 'j' is nan"),
         ({"initial_position": NAN}, "the initial position of joint 'j' is nan"),
+        ({"gravity": NAN}, "the share of gravity of the link on joint 'j' is nan"),
+        ({"gravity": 1.1}, "the share of gravity .* must be a number from -1e\\+06 to 1"),
     ],
 )
 def test_a_joint_that_cannot_be(change: dict[str, Any], said: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -63,9 +64,9 @@ def kitchen(tmp_path: Path) -> Path:
     return path
 
 
-def changed(path: Path, old: str, new: str) -> Reading:
-    text = KITCHEN.replace(old, new)
-    assert text != KITCHEN
+def changed(path: Path, old: str, new: str, whole: str = KITCHEN) -> Reading:
+    text = whole.replace(old, new)
+    assert text != whole
     path.write_text(text)
     return Reading(str(path))
 
@@ -97,6 +98,35 @@ def accelerations(reading: Reading, seed: int) -> dict[str, list[float]]:
         found[who] = [float(data.qacc[model.joint(name).dofadr][0]) for name in names]
     simulator.close()
     return found
+
+
+def borne(kitchen: Path, of_handle: str = ".4") -> Reading:
+    """Arm and hand are compensated, the arm in part, and so is what is fixed on it."""
+    text = KITCHEN.replace('name="hand"', 'name="hand" gravcomp="1"')
+    text = text.replace('name="handle"', f'name="handle" gravcomp="{of_handle}"')
+    kitchen.write_text(text)
+    return changed(kitchen, '<body name="arm"', '<body name="arm" gravcomp=".4"', text)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_compensated_links_accelerate_as_those_of_the_file(kitchen: Path, seed: int) -> None:
+    reading = borne(kitchen)
+    found = accelerations(reading, seed)
+    assert found["scene"] == pytest.approx(found["file"], rel=1e-5, abs=1e-6)
+    (line,) = (line for line in reading.account if "gravcomp" in line.quantity)
+    assert (line.state, line.where) == ("carried", "arm, handle, hand")
+    assert PreparedRobot(reading.scene.robot).gravity == {"drawer": 1.0, "arm": 0.6, "hand": 0.0}
+
+
+def test_a_link_of_parts_feels_their_mean_share_of_gravity(kitchen: Path) -> None:
+    """2 kg of 0.6 and 0.1 kg of the whole; without gravity nothing is compensated."""
+    reading = borne(kitchen, "0")
+    assert PreparedRobot(reading.scene.robot).gravity["arm"] == pytest.approx(1.3 / 2.1)
+    told = {line.quantity: line.state for line in reading.account}
+    assert told["body gravcomp (of parts)"] == "approximated"
+    still = '<option gravity="0 0 0"/><worldbody>'
+    reading = changed(kitchen, "<worldbody>", still, kitchen.read_text())
+    assert set(PreparedRobot(reading.scene.robot).gravity.values()) == {1.0}
 
 
 def test_limits_drives_and_the_rest_of_the_scene(kitchen: Path) -> None:
@@ -309,9 +339,12 @@ def test_what_no_tree_holds_is_refused(kitchen: Path, old: str, new: str, why: s
         changed(kitchen, old, new)
 
 
-def test_the_file_itself_moves_as_the_carried_tree(kitchen: Path) -> None:
+@pytest.mark.parametrize("read", [lambda path: Reading(str(path)), borne], ids=["plain", "borne"])
+def test_the_file_itself_moves_as_the_carried_tree(
+    kitchen: Path, read: Callable[[Path], Reading]
+) -> None:
     """The profile `file` beside `default`, a tenth of a second long."""
-    scene, found = Reading(str(kitchen)).scene, {}
+    scene, found = read(kitchen).scene, {}
     for profile in ("default", "file"):
         settings = with_changes(MuJoCo.profiles[profile], {"timestep": 1e-4}, "mujoco")
         simulator = MuJoCo(settings)
@@ -349,7 +382,8 @@ def test_a_start_outside_of_the_range_is_its_nearest_end(kitchen: Path) -> None:
 @pytest.mark.parametrize("name", ADAPTERS)
 def test_every_engine_holds_drawer_and_arm(kitchen: Path, case: Case, name: str) -> None:
     """Parity holds, the servo holds its link, and a ball that falls into the drawer does not move
-    it from its stop."""
+    it from its stop. Links feel shares of gravity."""
+    borne(kitchen)
     scene = read_scene_file(kitchen).scene
     with (
         closing(SimulatorHandle(case_of(case, name))) as handle,

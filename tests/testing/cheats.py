@@ -150,6 +150,14 @@ def with_inertia(scene: Scene) -> Scene:
     return bodies(of)(scene)
 
 
+def with_whole_weights(scene: Scene) -> Scene:
+    """Links whose weight is compensated fall."""
+    if scene.robot is None:
+        return scene
+    joints = tuple(replace(joint, gravity=1.0) for joint in scene.robot.joints)
+    return replace(scene, robot=replace(scene.robot, joints=joints))
+
+
 def of_drives(**factors: float) -> Lie:
     change = drives(**factors)
     return lambda scene: scene if scene.robot is None else change(scene)
@@ -165,6 +173,7 @@ ECHOES: dict[str, tuple[Lie, str]] = {
     "stiffness": (of_drives(stiffness=0.8), "static_hold"),
     "drive_damping": (of_drives(damping=0.6), "drives_are_springs"),
     "effort_limit": (of_drives(effort_limit=1.5), "every_effort_limit_counts"),
+    "link_gravity": (with_whole_weights, "links_feel_their_share_of_gravity"),
     "armature": (of_drives(armature=0.5), "limp_arm_falls"),
 }
 """What a copy hides: another value of a quantity, and the law that feels it."""

@@ -111,8 +111,8 @@ def test_faults_of_a_robot_stand_in_two_worlds(name: str) -> None:
     robot = find(name)
     faults = robot_faults(robot)
     quantities = [fault.quantity for fault in faults.values()]
-    assert len(faults) == 18
-    assert [len(group) for group in rounds((), faults)] == [16, 2]
+    assert len(faults) == 19
+    assert [len(group) for group in rounds((), faults)] == [17, 2]
     joints = {quantity.split("/")[1] for quantity in quantities if quantity.startswith("joint/")}
     assert joints <= set(RobotModel(robot).robot.joint_names)
 
