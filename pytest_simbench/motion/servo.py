@@ -35,7 +35,12 @@ class Servo:
         if scene.robot is None:
             raise LoopError(f"scene {scene.name!r} has no robot that a policy could move")
         self.model = RobotModel(scene.robot)
-        self._gravity = np.array(scene.gravity, dtype=float)
+        self._weights = self.model.pin.copy()
+        self._weights.gravity.linear = self.model.base.rotation.T @ np.array(scene.gravity)
+        for k, share in enumerate(scene.robot.column("gravity"), start=1):
+            link = self._weights.inertias[k]
+            self._weights.inertias[k] = pin.Inertia(share * link.mass, link.lever, link.inertia)
+        self._data = self._weights.createData()
         limits = scene.robot.limits
         own = np.array(self.model.pin.velocityLimit[: self.model.arm])
         self._fastest = own if limits is None else np.array(limits.velocity)
@@ -71,7 +76,6 @@ class Servo:
 
     def holding_effort(self, position: FloatArray) -> FloatArray:
         """What holds the arm against gravity, (n_joints,) [N m or N]; the fingers press alone."""
-        still = np.zeros((1, len(position)))
-        effort = self.model.inverse_dynamics(self._gravity, position[None], still, still)[0]
+        effort = pin.computeGeneralizedGravity(self._weights, self._data, position).copy()
         effort[self.model.arm :] = 0.0
         return np.asarray(effort)

@@ -92,6 +92,9 @@ def test_the_arm_is_held_against_gravity() -> None:
     still = np.zeros((1, 9))
     held = model.inverse_dynamics(np.array([0, 0, -9.81]), START[None], still, still)[0]
     np.testing.assert_allclose(at.effort[:7], held[:7], rtol=1e-3, atol=1e-9)
+    light = [replace(joint, gravity=0.0) for joint in panda().joints]
+    weightless = Servo(replace(SCENE, robot=replace(panda(), joints=tuple(light))))
+    assert not weightless.holding_effort(START).any()
     assert at.effort[7:].tolist() == [0.0, 0.0]
     at.after(Command(position=START[:7], effort=np.ones(7)))
     assert at.effort.tolist() == [1.0] * 7 + [0.0, 0.0]
