@@ -155,6 +155,14 @@ def of_drives(**factors: float) -> Lie:
     return lambda scene: scene if scene.robot is None else change(scene)
 
 
+def loose(scene: Scene) -> Scene:
+    """Welds are balls and their sockets."""
+    if scene.robot is None:
+        return scene
+    closures = tuple(replace(closure, rigid=False) for closure in scene.robot.closures)
+    return replace(scene, robot=replace(scene.robot, closures=closures))
+
+
 ECHOES: dict[str, tuple[Lie, str]] = {
     "gravity": (heavier, "free_fall"),
     "mass": (of_bodies(mass=2.0), "force_acts_for_its_time"),
@@ -166,6 +174,9 @@ ECHOES: dict[str, tuple[Lie, str]] = {
     "drive_damping": (of_drives(damping=0.6), "drives_are_springs"),
     "effort_limit": (of_drives(effort_limit=1.5), "every_effort_limit_counts"),
     "armature": (of_drives(armature=0.5), "limp_arm_falls"),
+    "rotor": (of_drives(armature=0.0), "rotors_are_heavy"),
+    "rest": (of_drives(rest=0.0), "joints_have_springs"),
+    "rigid": (loose, "welded_links_are_one"),
 }
 """What a copy hides: another value of a quantity, and the law that feels it."""
 
