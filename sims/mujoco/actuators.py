@@ -121,22 +121,16 @@ def drive_of(reading: Reading, joint: int) -> Drive:
 
 
 def _tell_ranges(reading: Reading, drive: Drive) -> None:
-    """What the ranges of its forces and controls are, and a drive does not hold."""
-    model, holds = reading.model, drive.stiffness or drive.damping
-    why = {
-        "force": "efforts have the larger limit to both sides",
-        "ctrl": "commands have no range"
-        if holds
-        else "efforts have the larger limit to both sides",
-    }
-    for kind, reason in why.items():
-        limited = getattr(model, f"actuator_{kind}limited")
-        for k in drive.numbers[limited[drive.numbers] != 0].tolist():
+    """The ranges of forces and controls that a drive does not hold."""
+    model, servo = reading.model, bool(drive.stiffness or drive.damping)
+    for kind, open_ in (("force", False), ("ctrl", servo)):
+        reason = "commands have no range" if open_ else "the larger limit holds to both sides"
+        for k in drive.numbers.tolist():
             low, high = getattr(model, f"actuator_{kind}range")[k]
-            if low != -high or (kind == "ctrl" and holds):
+            if getattr(model, f"actuator_{kind}limited")[k] and (open_ or low != -high):
                 told = f"{reason}; in the file: {low:g} to {high:g}"
-                name = [reading.name("actuator", k)]
-                reading.tell(f"actuator {kind}range", APPROXIMATED, told, name)
+                name = reading.name("actuator", k)
+                reading.tell(f"actuator {kind}range", APPROXIMATED, told, [name])
 
 
 def _plain(model: Any, number: int) -> bool:

@@ -108,8 +108,8 @@ class Constraints:
         names = [self.reading.name("body", body) for body in bodies]
         roots = map(self.reading.root, bodies)
         free = [n for n, root in zip(names, roots, strict=True) if not self.tree.link_of(root)]
-        reason = f"it holds {names[0]} at {names[1]}, and only links are held here: "
-        reason += f"{' and '.join(free)} moves freely, and may fall or part"
+        reason = f"it holds {names[0]} at {names[1]}, and only links are held here; what moves "
+        reason += f"freely may fall or part: {' and '.join(free)}"
         led = [n for n, b in zip(names, bodies, strict=True) if self.model.body_mocapid[b] >= 0]
         return reason + (f"; {led[0]} is a mocap body, and nothing moves it" if led else "")
 

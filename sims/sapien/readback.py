@@ -113,13 +113,9 @@ class ReadBack(readback.ReadBack):
         }
 
     def closures(self) -> list[tuple[FloatArray, bool]]:
-        return [
-            (
-                np.array([made.pose_in_parent.p, made.pose_in_child.p]),
-                made.get_drive_property_slerp()[0] > 0,
-            )
-            for made in self.made
-        ]
+        points = [np.array([made.pose_in_parent.p, made.pose_in_child.p]) for made in self.made]
+        welds = [made.get_drive_property_slerp()[0] > 0 for made in self.made]
+        return list(zip(points, welds, strict=True))
 
     def collide(self, first: Any, second: Any) -> Any:
         """By PhysX's filter as SAPIEN sets it; two links that one joint joins never do."""

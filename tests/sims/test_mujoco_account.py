@@ -112,7 +112,7 @@ NO_PHYSICS = {
     "of what sleeps, which is an option": "body/*/sleep",
     "walked on another of the kind": "body/world/* body/arm/* body/door/* body/box/* body/*/mocap "
     "body/post/[!pq]* geom/floor/* geom/pole/* joint/slide/* joint/hinge/* actuator/push/[!c]* "
-    "geom/stone/[!f]* geom/stone/fluid* geom/stone/fromto* geom/palm/[!pqst]* site/there/*",
+    "geom/stone/[!f]* geom/stone/fluid* geom/stone/fromto* geom/palm/[!fpqst]* site/there/*",
 }
 """Attributes (patterns of `KIND/NAME/ATTRIBUTE/PLACE`) that are not asked, by the reason."""
 

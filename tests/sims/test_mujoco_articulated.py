@@ -79,6 +79,15 @@ def test_joints_accelerate_as_those_of_the_file(kitchen: Path, seed: int) -> Non
     assert found["scene"] == pytest.approx(found["file"], rel=1e-5, abs=1e-6)
 
 
+def test_rotors_and_damping_of_actuators_are_those_of_the_joint(kitchen: Path) -> None:
+    own = '<position armature=".02" damping=".5" gear="3"'
+    reading = changed(kitchen, "<position", own)
+    found = accelerations(reading, 1)
+    assert found["scene"] == pytest.approx(found["file"], rel=1e-5, abs=1e-6)
+    elbow = reading.scene.robot.joints[-1]
+    assert (elbow.armature, elbow.passive_damping) == pytest.approx((0.18, 4.5))
+
+
 def accelerations(reading: Reading, seed: int) -> dict[str, list[float]]:
     """Of all joints, in the file's model and in the scene's, without contacts."""
     assert reading.scene.robot is not None
@@ -112,40 +121,6 @@ def test_limits_drives_and_the_rest_of_the_scene(kitchen: Path) -> None:
     assert scene.robot.self_collide
     assert scene.apart == (("link/arm", "link/hand"),)  # parent and child
     assert [body.name for body in scene.bodies] == ["cabinet", "ball"]
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ('pos="0 -.2 0"', 'pos="0 -.1 0"'),
-        ('axis="0 .6 .8"', 'axis="0 .8 .6"'),
-        ('name="elbow"', 'name="elbow" type="slide"'),
-        ('range="0 .25"', 'range="0 .3"'),
-        ('range="0 .25"', 'range="0 .25" ref=".1"'),
-        ('armature=".01"', 'armature=".02"'),
-        ('damping=".05"', 'damping=".06"'),
-        ('stiffness="3"', 'stiffness="4"'),
-        ('stiffness="3"', 'stiffness="3" springref="20"'),
-        ('name="elbow"', 'name="elbow" frictionloss=".1"'),
-        ('name="elbow"', 'name="elbow" limited="true" range="-1 1" margin=".1"'),
-        ('name="slide"', 'name="slide" solreflimit=".05 1"'),
-        ('name="slide"', 'name="slide" solimplimit=".8 .9 .01"'),
-        ('name="slide"', 'name="slide" actuatorfrcrange="-1 1"'),
-        ('kp="20"', 'kp="21"'),
-        ('kv="2"', 'kv="3"'),
-        ('kp="20" kv="2"', 'kp="20" kv="2" gear="2"'),
-        ("-8 8", "-9 9"),
-        ('name="palm"', 'name="palm" friction=".3"'),
-        ('size=".03 .1"', 'size=".03 .11"'),
-        ('euler="10 0 0"', 'euler="20 0 0"'),
-        ('name="hand"', 'name="hand" gravcomp="1"'),
-        ("<position name", '<motor joint="slide"/><position name'),
-    ],
-)
-def test_nothing_of_a_joint_is_dropped_in_silence(kitchen: Path, old: str, new: str) -> None:
-    before = Reading(str(kitchen))
-    after = changed(kitchen, old, new)
-    assert before.scene != after.scene or before.account != after.account
 
 
 def test_masks_between_links_and_the_rest_keep_them_apart(kitchen: Path) -> None:
@@ -218,7 +193,7 @@ def moved(path: Path) -> np.ndarray:
 @pytest.mark.parametrize(
     ("held", "why"),
     [
-        ('<weld body1="ball" body2="drawer"/>', "it holds ball at drawer, .*: ball moves freely"),
+        ('<weld body1="ball" body2="drawer"/>', "it holds ball at drawer, .* fall or part: ball"),
         ('<weld body1="arm" body2="drawer" relpose="0 0 1 1 0 0 0"/>', "is open by"),
         ('<joint joint1="slide" polycoef=".1 0 0 0 0"/>', "two hinges or sliders"),
         ('<joint joint1="slide" joint2="elbow" polycoef="0 0 1 0 0"/>', "polynomial"),
@@ -243,7 +218,7 @@ def test_constraints_of_free_bodies_say_what_may_part(kitchen: Path, kind: str, 
     reading = changed(kitchen, "</worldbody>", f'<body name="led" mocap="true"/>{held}')
     (line,) = (line for line in reading.account if line.quantity == f"equality ({kind})")
     assert f"holds ball at {other}, " in line.reason
-    assert "ball moves freely, and may fall or part" in line.reason
+    assert "may fall or part: ball" in line.reason
     assert ("led is a mocap body" in line.reason) == (other == "led")
 
 
