@@ -97,8 +97,8 @@ DERIVED = frozenset(
         "simple subtreemass treeid user weldid",
         "jnt": "actuatorid axis bodyid dofadr group plasticadr pos qposadr type user",
         "dof": "M0 Madr bodyid damping invweight0 jntid length parentid simplenum treeid",
-        "actuator": "acc0 actadr armature biasprm biastype ctrladr ctrllimited ctrlrange damping "
-        "forcelimited forcerange gainprm gear group historyadr length0 outadr trnid user",
+        "actuator": "acc0 actadr armature biasprm biastype ctrladr ctrllimited ctrlrange ctrlspec "
+        "damping forcelimited forcerange gainprm gear group historyadr length0 outadr trnid user",
         "eq": "active0 data obj1id obj2id objtype type",
     }.items()
     for name in names.split()

@@ -110,6 +110,7 @@ NO_PHYSICS = {
     "equality/connect/data/10 equality/gears/data/[5-9] equality/gears/data/10 "
     "equality/weld/data/[0-26] equality/sites/data/? geom/palm/fitscale geom/brick/fitscale",
     "of what sleeps, which is an option": "body/*/sleep",
+    "how the one input of a plain actuator is called": "actuator/*/ctrlspec",
     "walked on another of the kind": "body/world/* body/arm/* body/door/* body/box/* body/*/mocap "
     "body/post/[!pq]* geom/floor/* geom/pole/* joint/slide/* joint/hinge/* actuator/push/[!c]* "
     "geom/stone/[!f]* geom/stone/fluid* geom/stone/fromto* geom/palm/[!fpqst]* site/there/*",
@@ -126,7 +127,6 @@ TOGETHER: dict[str, dict[str, Any]] = {
     "actuator/*/target": {"target": "hinge"},
     "actuator/speed/target": {"target": "slide"},
     "actuator/*/delay": {"nsample": 2},
-    "actuator/speed/ctrlspec": {"ctrlspec": 1},
     "actuator/motor/biastype": {"biasprm": [1.0] + [0.0] * 9},
     "body/*/fullinertia/*": {"inertia": [0.0] * 3, "fullinertia": [0.01, 0.01, 0.01, 0.001, 0, 0]},
     "compiler/boundmass": {"boundmass": 5.0},
