@@ -7,8 +7,8 @@
     link/NAME/{pose, boxes, rounds, meshes, friction, restitution, margin, touches}
         and of a link that moves {mass, com, inertia, damping, gravity}
     joint/NAME/{axis, limits, effort_limit, stiffness, damping, friction, armature,
-        initial_position}
-    closure/NUMBER/points, coupling/FOLLOWER
+        initial_position} and of one with a spring rest
+    closure/NUMBER/{points, rigid}, coupling/FOLLOWER
 
 Links are those of the prepared robot (`description.urdf`), in which fixed joints are merged; its
 base is the link `base`, whose frame is the world's.
@@ -36,8 +36,9 @@ base is the link `base`, whose frame is the world's.
 - stiffness and damping of a joint: of its drive and all else that pulls in proportion to position
   and velocity; friction: what resists its motion beside that [N m, N]. A joint's own friction
   replaces that of the settings.
+- rest: position at which the joint's own spring is without load [rad, m].
 - points: of a closure of the robot, by its number from 0 on: those that are held together, each in
-  its link's frame, (2, 3) [m].
+  its link's frame, (2, 3) [m]; rigid: 1 for a weld, 0 for a ball and its socket.
 - coupled: 1 if the fingers are. coupling: ratio and offset of a joint to its leader, (2,).
 """
 
@@ -140,9 +141,11 @@ def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
             armature=joint.armature,
             initial_position=joint.initial_position,
         )
+        if joint.spring:
+            quantities[f"joint/{joint.name}/rest"] = joint.rest
     for k, closure in enumerate(reduced(prepared)):
         points = np.array([closure.first_point, closure.second_point])
-        quantities[f"closure/{k}/points"] = points
+        quantities |= named(f"closure/{k}", points=points, rigid=float(closure.rigid))
     for pair in robot.couplings:
         quantities[f"coupling/{pair.follower}"] = np.array([pair.ratio, pair.offset])
     poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})

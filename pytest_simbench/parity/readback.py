@@ -52,8 +52,8 @@ class ReadBack(ABC):
                 reported |= named(f"link/{name}", **found)
             for name in robot.joint_names:
                 reported |= named(f"joint/{name}", **self.joint(name))
-            for k, points in enumerate(self.closures()):
-                reported[f"closure/{k}/points"] = points
+            for k, (points, rigid) in enumerate(self.closures()):
+                reported |= named(f"closure/{k}", points=points, rigid=float(rigid))
             for pair in robot.couplings:
                 if (told := self.coupling(pair)) is not None:
                     reported[f"coupling/{pair.follower}"] = told
@@ -98,10 +98,11 @@ class ReadBack(ABC):
 
     @abstractmethod
     def joint(self, name: str) -> dict[str, Any]:
-        """The quantities of a driven joint."""
+        """The quantities of a driven joint; `rest` where it has a spring."""
 
-    def closures(self) -> Iterable[FloatArray]:
-        """The points of each closure in the frames of its links, (2, 3) each [m]."""
+    def closures(self) -> Iterable[tuple[FloatArray, bool]]:
+        """The points of each closure in the frames of its links, (2, 3) [m], and whether it is a
+        weld."""
         return ()
 
     def coupled(self, pairs: tuple[Coupling, ...]) -> bool | None:

@@ -16,9 +16,11 @@ import numpy as np
 from pytest_simbench.description.robot_files import content_of, digest, folder, keep
 from pytest_simbench.description.shapes import mesh_points
 from pytest_simbench.description.stl import written_stl
+from pytest_simbench.laws.mechanisms import Part, Y, mechanism
 from pytest_simbench.scene import (
     Box,
     Capsule,
+    Closure,
     Compound,
     ConvexMesh,
     Cylinder,
@@ -351,6 +353,25 @@ FAULTS: dict[str, Fault] = {
     **{name: Fault(*row) for name, row in _ROWS.items()},
 }
 """By short names."""
+
+
+def mechanisms(capabilities: Collection[Capability]) -> list[tuple[Scene, dict[str, Fault]]]:
+    """True scenes of levers with a spring and with a weld, each with the fault of that."""
+    first, second = (Part(f"lever {k}", Y, centre=(0.3, 0.0, 0.0)) for k in (1, 2))
+    sprung = mechanism("sprung", replace(first, spring=20.0, rest=0.3))
+    weld = Closure(first.link, second.link, (0.1, 0.0, 0.0), (0.1, 0.0, 0.0), rigid=True)
+    welded = mechanism("welded", first, second, closures=(weld,))
+    shifted = Fault("the spring is at rest 0.1 rad farther", f"joint/{first.name}/rest",
+                    with_own(first.name, rest=0.4), None, "spring")  # fmt: skip
+    loose = Fault("a ball and its socket in place of the weld", "closure/0/rigid",
+                  of_robot(lambda r: replace(r, closures=(replace(weld, rigid=False),))),
+                  Capability.LOOPS)  # fmt: skip
+    rows = {"rest": (sprung, shifted), "weld": (welded, loose)}
+    return [
+        (Scene(name, robot=robot), {name: fault})
+        for name, (robot, fault) in rows.items()
+        if fault.needs in (None, *capabilities)
+    ]
 
 
 def rounds(

@@ -14,7 +14,14 @@ from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.checks import any_robot, check
 from pytest_simbench.testing.contract import SINGLE
-from pytest_simbench.testing.faults import FAULTS, Fault, robot_faults, rounds, true_scene
+from pytest_simbench.testing.faults import (
+    FAULTS,
+    Fault,
+    mechanisms,
+    robot_faults,
+    rounds,
+    true_scene,
+)
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require
 
@@ -83,13 +90,16 @@ def reading_changes_nothing(subject: Subject) -> None:
 def planted_faults_are_seen(subject: Subject) -> None:
     """Parity sees each fault of `testing.faults.FAULTS` that the adapter does not declare as not
     told; also when the adapter is made to remember the true scene, so that it must ask the engine.
-    With another robot than the Panda the faults are those of `testing.faults.robot_faults`.
+    With another robot than the Panda the faults are those of `testing.faults.robot_faults`; with
+    the Panda also those of `testing.faults.mechanisms`.
     """
     missed = []
     robot, capabilities = subject.robot, subject.cls.info.capabilities
     lacking = [deviation for deviation in subject.cls.info.deviations if deviation.only]
-    for faults in rounds(capabilities, robot_faults(robot) if robot else FAULTS):
-        found = planted(subject, faults.values())
+    truth = _truth(subject)
+    worlds = [(truth, f) for f in rounds(capabilities, robot_faults(robot) if robot else FAULTS)]
+    for scene, faults in worlds if robot else [*worlds, *mechanisms(capabilities)]:
+        found = planted(subject, faults.values(), scene)
         for name, fault in faults.items():
             if any(d.only == fault.word and d.quantity and d.within is None for d in lacking):
                 continue
@@ -98,9 +108,10 @@ def planted_faults_are_seen(subject: Subject) -> None:
     require(not missed, f"parity does not see {'; '.join(missed)}")
 
 
-def planted(subject: Subject, faults: Iterable[Fault]) -> ParityResult:
-    """A world with the faults, read back by an adapter that remembers the true scene."""
-    truth = faulty = _truth(subject)
+def planted(subject: Subject, faults: Iterable[Fault], truth: Scene | None = None) -> ParityResult:
+    """A world with the faults, read back by an adapter that remembers the true scene; None: the
+    kit's full one."""
+    truth = faulty = truth or _truth(subject)
     for fault in faults:
         faulty = fault.plant(faulty)
     with subject.world(faulty, parity=False) as world:

@@ -112,7 +112,8 @@ class ReadBack(readback.ReadBack):
         }
         stray = sum(value for word, value in passive.items() if word not in self.scene.words)
         limits = [joint.getPositionLowerLimit(0), joint.getPositionUpperLimit(0)]
-        return {
+        rest = {"rest": joint.getRestPosition(0)} if passive["spring"] else {}
+        return rest | {
             "axis": np.ravel(joint.getRelativeJacobian()),
             "limits": limits if joint.areLimitsEnforced() else [-np.inf, np.inf],
             "effort_limit": one_value(forces),

@@ -98,7 +98,7 @@ class ReadBack(readback.ReadBack):
         joint, drive = self.made.joints[name], self.made.drives[name]
         gains, own = drive.get_controller_gains(), self.made.springs.get(name)
         brake = self.made.brakes.get(name)
-        return {
+        return ({} if own is None else {"rest": _rest(own, self.context)}) | {
             "axis": _axis(joint),
             "limits": [joint.position_lower_limits()[0], joint.position_upper_limits()[0]],
             "effort_limit": drive.effort_limit(),
@@ -187,6 +187,14 @@ def _stiffness(spring: Any, context: Any) -> float:
     """Of a spring in a joint; those of hinges tell it as a parameter from release to release."""
     told = spring.GetStiffness(context) if hasattr(spring, "GetStiffness") else spring.stiffness()
     return float(told)
+
+
+def _rest(spring: Any, context: Any) -> float:
+    """Where it is without load, told likewise."""
+    if hasattr(spring, "GetNominalAngle"):
+        return float(spring.GetNominalAngle(context))
+    hinge = hasattr(spring, "nominal_angle")
+    return float(spring.nominal_angle() if hinge else spring.nominal_position())
 
 
 def _axis(joint: Any) -> FloatArray:

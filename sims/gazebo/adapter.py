@@ -76,7 +76,7 @@ class Gazebo(Simulator):
                 only="joint_friction",
             ),
             Deviation(
-                "joint/*/stiffness",
+                "joint/*/stiffness joint/*/rest",
                 "the adapter gives joints no springs: SDF's were not tried",
                 only="spring",
             ),

@@ -66,12 +66,13 @@ class ReadBack(readback.ReadBack):
                     return np.array([ratio, offset])
         return np.full(2, np.nan)
 
-    def closures(self) -> list[FloatArray]:
+    def closures(self) -> list[tuple[FloatArray, bool]]:
         _, _, kinds = self._equalities()
         joined = (genesis.EQUALITY_TYPE.CONNECT, genesis.EQUALITY_TYPE.WELD)
         loops = np.flatnonzero(np.isin(kinds, joined))
         data = self._array("equalities", "eq_data")[loops, 0]
-        return [row[:6].reshape(2, 3) for row in data]
+        weld = kinds[loops] == genesis.EQUALITY_TYPE.WELD
+        return [(row[:6].reshape(2, 3), w) for row, w in zip(data, weld, strict=True)]
 
     def _array(self, group: str, name: str) -> Any:
         """A tensor of the solver's description, read once."""
@@ -186,7 +187,8 @@ class ReadBack(readback.ReadBack):
         same = np.isclose(high, -low, rtol=1e-6, atol=np.spacing(np.abs(of["force_range"]).max()))
         anchor = self._array("joints", "pos")[joint.idx]
         linear = of["motion_vel"] + np.cross(anchor, of["motion_ang"])
-        return {
+        spring, push = of["stiffness"], of["act_bias"][0]  # which moves the spring's rest
+        return ({"rest": push / spring} if spring else {}) | {
             "axis": np.concatenate([of["motion_ang"], linear]),
             "limits": of["limit"],
             "effort_limit": high if same else np.array([low, high]),

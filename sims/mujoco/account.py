@@ -15,16 +15,17 @@ from pytest_simbench.description.carried import CARRIED, NOT_CARRIED, named
 from pytest_simbench.scene import FloatArray
 from pytest_simbench.simulator import lazy_import
 
-from .told import DERIVED, HELD_BY_DRIVES, OBJECTS, OPTIONS, SOLVER, TOLD, TOLD_ON_JOINTS
+from .told import DERIVED, HELD, HELD_BY_DRIVES, OBJECTS, OPTIONS, SOLVER, TOLD, TOLD_ON_JOINTS
 
 if TYPE_CHECKING:
     from .reading import Reading
 
 mujoco = lazy_import("mujoco")
 
-PLAIN = '<mujoco><worldbody><body>{}<geom size="1"/></body></worldbody></mujoco>'
+PLAIN = """<mujoco><worldbody><body name="b"><{} name="j"/><geom size="1"/></body></worldbody>
+<actuator><motor joint="j"/></actuator><equality><weld body1="b"/></equality></mujoco>"""
 
-NAMED = {"jnt": "joint", "dof": "joint"}
+NAMED = {"jnt": "joint", "dof": "joint", "eq": "equality"}
 """What names an element, by how its fields begin."""
 
 
@@ -40,10 +41,15 @@ def tell_the_rest(reading: Reading) -> None:
         "jnt": [int(model.body_jntadr[root]) for root in roots],
         "dof": [int(model.body_dofadr[root]) + k for root in roots for k in range(6)],
     }
-    _tell_fields(reading, "<freejoint/>", free, TOLD, DERIVED)
+    _tell_fields(reading, "freejoint", free, TOLD, DERIVED)
     joints = [link.joint for link in reading.links]
-    held = {"jnt": joints, "dof": [int(model.jnt_dofadr[joint]) for joint in joints]}
-    _tell_fields(reading, "<joint/>", held, TOLD_ON_JOINTS, DERIVED | HELD_BY_DRIVES)
+    held = {
+        "jnt": joints,
+        "dof": [int(model.jnt_dofadr[joint]) for joint in joints],
+        "actuator": sorted(int(k) for drive in reading.tree.drives for k in drive.numbers),
+        "eq": sorted(reading.tree.constraints.carried),
+    }
+    _tell_fields(reading, "joint", held, TOLD_ON_JOINTS, DERIVED | HELD_BY_DRIVES)
     _tell_objects(reading)
 
 
@@ -65,7 +71,7 @@ def _tell_shapes(reading: Reading) -> None:
 
 def _tell_options(reading: Reading) -> None:
     option = reading.model.opt
-    plain = mujoco.MjModel.from_xml_string(PLAIN.format("")).opt
+    plain = mujoco.MjModel.from_xml_string(PLAIN.format("joint")).opt
     told = {name: values_of(np.array([getattr(option, name)])) for name in SOLVER}
     reading.tell(
         "option " + ", ".join(SOLVER),
@@ -90,11 +96,11 @@ def _tell_fields(
     told: Mapping[str, tuple[str, str, bool]],
     known: frozenset[str],
 ) -> None:
-    """What a plain ball on such a joint has not.
+    """What a plain ball with a motor and a weld has not.
 
     Args:
         reading: of the file.
-        joint: of the ball, an element.
+        joint: of the ball, an element's name.
         rows: numbers of the elements that are looked at, by kind.
         told: as `TOLD`.
         known: fields that are carried, follow from what is, or are no physics.
@@ -121,18 +127,15 @@ def _tell_fields(
 
 
 def _tell_objects(reading: Reading) -> None:
-    tree = reading.tree
-    told = {
-        "nu": {int(k) for drive in tree.drives for k in drive.numbers},
-        "neq": set(range(reading.model.neq)) if reading.links else set(),
-    }
+    model, carried = reading.model, {k for drive in reading.tree.drives for k in drive.numbers}
+    left = [k for k in range(getattr(model, "nactuator", model.nu)) if k not in carried]
+    if left:
+        names = [reading.name("actuator", k) for k in left]
+        reading.tell("actuator", NOT_CARRIED, HELD, names)
     for count, (kind, reason) in OBJECTS.items():
-        carried = told.get(count, set())
-        left = [k for k in range(int(getattr(reading.model, count, 0))) if k not in carried]
+        left = list(range(getattr(model, count, 0)))
         if left:
-            known = hasattr(reading.model, kind)
-            where = [reading.name(kind, k) if known else f"{kind} {k}" for k in left]
-            reading.tell(kind, NOT_CARRIED, reason, where)
+            reading.tell(kind, NOT_CARRIED, reason, [reading.name(kind, k) for k in left])
 
 
 def values_of(values: FloatArray) -> str:

@@ -30,15 +30,18 @@ class Drive:
     """The plain actuators of a joint together.
 
     Attributes:
-        numbers: of the actuators, (n,).
+        numbers, channels: of the actuators, and of their controls, (n,).
         gears, gains, constants: of each, (n,).
         zero: position of the joint in which the file is written [rad or m].
         stiffness: [N m/rad, N/m].
         damping: [N m s/rad, N s/m].
         limit: largest effort, `STRONG` without one [N m, N].
+        rotor, resistance: what all actuators of the joint, also those that are left out, add to its
+            armature [kg m^2, kg] and to its own damping [N m s/rad, N s/m].
     """
 
     numbers: FloatArray
+    channels: FloatArray
     gears: FloatArray
     gains: FloatArray
     constants: FloatArray
@@ -46,6 +49,8 @@ class Drive:
     stiffness: float
     damping: float
     limit: float
+    rotor: float
+    resistance: float
 
     def target(self, controls: FloatArray) -> float | None:
         """Where it holds the joint, from where the file is written, with the controls of a
@@ -59,7 +64,7 @@ class Drive:
 
     def _pull(self, controls: FloatArray) -> float:
         """With the joint at rest at 0."""
-        return float(self.gears @ (self.gains * controls[self.numbers] + self.constants))
+        return float(self.gears @ (self.gains * controls[self.channels] + self.constants))
 
     def controls(self, target: float) -> FloatArray:
         """The controls, (n,), with which it holds the joint there, from where the file is written
@@ -81,7 +86,7 @@ def drive_of(reading: Reading, joint: int) -> Drive:
     if stiffness < 0 or damping < 0 or (stiffness and not np.any(gains * gears)):
         plain = plain[:0]  # what drives a joint away from where it is, or cannot be commanded
         gears, gains, constants, stiffness, damping = plain, plain, plain, 0.0, 0.0
-    limits = np.abs(model.actuator_forcerange[plain]).min(axis=1) * np.abs(gears)
+    limits = np.abs(model.actuator_forcerange[plain]).max(axis=1) * np.abs(gears)
     limits = np.where(model.actuator_forcelimited[plain], limits, STRONG)
     if not stiffness and not damping:  # controls of motors are efforts, and have limits too
         most = np.abs(gains) * np.abs(model.actuator_ctrlrange[plain]).max(axis=1)
@@ -89,7 +94,16 @@ def drive_of(reading: Reading, joint: int) -> Drive:
         limits = np.where(model.actuator_ctrllimited[plain], np.minimum(limits, most), limits)
     limit = float(limits.sum()) if len(plain) else STRONG
     zero = float(model.qpos0[model.jnt_qposadr[joint]])
-    made = Drive(plain, gears, gains, constants, zero, stiffness, damping, min(limit, STRONG))
+    channels = getattr(model, "actuator_ctrladr", np.arange(model.nu))[plain]
+    added = [
+        float(np.sum(getattr(model, field, 0.0 * on_joint)[own] * model.actuator_gear[own, 0] ** 2))
+        for field in ("actuator_armature", "actuator_damping")
+    ]
+    made = Drive(
+        plain, channels, gears, gains, constants, zero, stiffness, damping, min(limit, STRONG),
+        *added,
+    )  # fmt: skip
+    _tell_ranges(reading, made)
     names = [reading.name("actuator", int(k)) for k in plain]
     if stiffness:
         reason = f"it holds its joint where it starts, by at most {made.limit:g} N m or N"
@@ -106,11 +120,28 @@ def drive_of(reading: Reading, joint: int) -> Drive:
     return made
 
 
+def _tell_ranges(reading: Reading, drive: Drive) -> None:
+    """The ranges of forces and controls that a drive does not hold."""
+    model, servo = reading.model, bool(drive.stiffness or drive.damping)
+    for kind, open_ in (("force", False), ("ctrl", servo)):
+        reason = "commands have no range" if open_ else "the larger limit holds to both sides"
+        for k in drive.numbers.tolist():
+            low, high = getattr(model, f"actuator_{kind}range")[k]
+            if getattr(model, f"actuator_{kind}limited")[k] and (open_ or low != -high):
+                told = f"{reason}; in the file: {low:g} to {high:g}"
+                name = reading.name("actuator", k)
+                reading.tell(f"actuator {kind}range", APPROXIMATED, told, [name])
+
+
 def _plain(model: Any, number: int) -> bool:
-    """Whether an actuator's effort is affine in control, position and velocity."""
+    """Whether an actuator's effort is affine in control, position and velocity, and it is on."""
+    group = int(model.actuator_group[number])
+    off = 0 <= group <= 30 and model.opt.disableactuator >> group & 1
     biases = (mujoco.mjtBias.mjBIAS_NONE, mujoco.mjtBias.mjBIAS_AFFINE)
     return bool(
-        model.actuator_dyntype[number] == mujoco.mjtDyn.mjDYN_NONE
+        not off
+        and model.actuator_plugin[number] < 0
+        and model.actuator_dyntype[number] == mujoco.mjtDyn.mjDYN_NONE
         and model.actuator_gaintype[number] == mujoco.mjtGain.mjGAIN_FIXED
         and any(model.actuator_biastype[number] == bias for bias in biases)
     )

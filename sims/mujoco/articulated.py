@@ -112,6 +112,7 @@ class Tree:
 
     Attributes:
         drives, limits: of the joints, in their order.
+        constraints: between links.
     """
 
     def __init__(self, reading: Reading, links: list[OnJoint]) -> None:
@@ -122,8 +123,9 @@ class Tree:
         self.drives: list[Drive] = []
         self.limits: list[list[float]] = []
 
-    def robot(self, lift: float, self_collide: bool) -> Robot:
-        """The robot, its mount at the file's origin, that height above the world's [m]."""
+    def robot(self, lift: float, self_collide: bool) -> Robot | None:
+        """The robot, its mount at the file's origin, that height above the world's [m]; None: the
+        file has no links."""
         root = ET.Element("robot", name="tree")
         ET.SubElement(root, "link", name=MOUNT)
         joints = []
@@ -143,8 +145,10 @@ class Tree:
             joints.append(joint)
         geoms = [g for link in self.links if link.whole for g in self.reading.geoms_of(link)]
         frictions = self.model.geom_friction[geoms, 0] if geoms else np.ones(1)
+        self.constraints = constraints = Constraints(self, [j.initial_position for j in joints])
+        if not joints:
+            return None
         self._tell(frictions)
-        constraints = Constraints(self, [joint.initial_position for joint in joints])
         ET.indent(root)
         return Robot(
             name="tree",
@@ -234,9 +238,9 @@ class Tree:
             max(drive.stiffness, FREE),
             drive.damping,
             drive.limit if len(drive.numbers) else FREE,
-            float(model.dof_armature[dof]),
+            float(model.dof_armature[dof]) + drive.rotor,
             min(max(0.0, limits[0]), limits[1]),
-            passive_damping=float(np.ravel(model.dof_damping[dof])[0]),
+            passive_damping=float(np.ravel(model.dof_damping[dof])[0]) + drive.resistance,
             friction=float(model.dof_frictionloss[dof]),
             spring=float(np.ravel(model.jnt_stiffness[joint])[0]),
             rest=float(model.qpos_spring[at] - model.qpos0[at]),

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED
+from pytest_simbench.description.carried import CARRIED, NOT_CARRIED
 from pytest_simbench.scene import Closure, Coupling, FloatArray, Pose
 from pytest_simbench.scene.pose import vector3
 from pytest_simbench.simulator import lazy_import
+
+from .told import HELD
 
 if TYPE_CHECKING:
     from .articulated import Tree
@@ -35,8 +37,9 @@ class Constraints:
     def __init__(self, tree: Tree, starts: list[float]) -> None:
         self.tree, self.reading, self.model = tree, tree.reading, tree.model
         self.data = mujoco.MjData(self.model)
-        at = self.model.jnt_qposadr[[link.joint for link in tree.links]]
-        self.data.qpos[at] += starts
+        at = self.model.jnt_qposadr[np.array([link.joint for link in tree.links], dtype=int)]
+        self.data.qpos[at] += np.asarray(starts)
+        self.starts = {link.joint: q for link, q in zip(tree.links, starts, strict=True)}
         mujoco.mj_kinematics(self.model, self.data)
         self.closures: list[Closure] = []
         self.couplings: list[Coupling] = []
@@ -51,10 +54,8 @@ class Constraints:
                 self._couple(k)
             elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
                 self._hold(k, kind == kinds.mjEQ_WELD)
-        if self.carried:
-            reason = "it is as stiff as an engine has it"
-            names = [self._name(k) for k in sorted(self.carried)]
-            self.reading.tell("equality solref, solimp, torquescale", APPROXIMATED, reason, names)
+            else:
+                self._tell(k, kind.name.removeprefix("mjEQ_").lower(), HELD)
 
     def _name(self, number: int) -> str:
         return self.reading.name("equality", number)
@@ -70,13 +71,14 @@ class Constraints:
         model, joints = self.model, {link.joint: link.told for link in self.tree.links}
         follower, leader = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
         offset, ratio, *higher = model.eq_data[k, :5].tolist()
-        problem = ""
+        problem, at = "", [self.starts.get(joint, 0.0) for joint in (follower, leader)]
+        gap = at[0] - ratio * at[1] - offset
         if follower not in joints or leader not in joints:
             problem = "only two hinges or sliders move together here"
         elif any(higher):
             problem = "joints move together here in proportion, and not by a polynomial"
-        elif abs(offset) > OPEN:
-            problem = f"where the file starts, the joints are {offset:g} rad or m from where it is"
+        elif abs(gap) > OPEN:
+            problem = f"where the file starts, the joints are {gap:g} rad or m from where it is"
         else:
             self.couplings.append(Coupling(joints[follower], joints[leader], ratio, offset))
         self._tell(k, "joint", problem)
@@ -84,10 +86,13 @@ class Constraints:
     def _hold(self, k: int, weld: bool) -> None:
         ends = self._ends(k)
         kind = "weld" if weld else "connect"
-        if ends is None:
-            self._tell(k, kind, "it holds a body that moves freely, and only links are held here")
+        if isinstance(ends, str):
+            self._tell(k, kind, ends)
             return
         first, second, anchor, gap = ends
+        if weld and self.model.eq_data[k, 10] != 1:
+            reason = f"a weld is as stiff as an engine has it; {self.model.eq_data[k, 10]:g}"
+            self.reading.tell("equality torquescale", NOT_CARRIED, reason, [self._name(k)])
         if gap > OPEN:
             self._tell(k, kind, f"where the file starts, it is open by {gap:.3g} m or rad")
             return
@@ -98,9 +103,19 @@ class Constraints:
             self.closures.append(Closure(first, second, a, b, rigid=weld))
         self._tell(k, kind, "")
 
-    def _ends(self, k: int) -> tuple[str, str, FloatArray, float] | None:
+    def _free(self, bodies: list[int]) -> str:
+        """What it means that a constraint of these bodies is left out."""
+        names = [self.reading.name("body", body) for body in bodies]
+        roots = map(self.reading.root, bodies)
+        free = [n for n, root in zip(names, roots, strict=True) if not self.tree.link_of(root)]
+        reason = f"it holds {names[0]} at {names[1]}, and only links are held here; what moves "
+        reason += f"freely may fall or part: {' and '.join(free)}"
+        led = [n for n, b in zip(names, bodies, strict=True) if self.model.body_mocapid[b] >= 0]
+        return reason + (f"; {led[0]} is a mocap body, and nothing moves it" if led else "")
+
+    def _ends(self, k: int) -> tuple[str, str, FloatArray, float] | str:
         """Both links, a point of the constraint in the file's world [m], and how far it is open
-        where the file starts [m or rad]; None: one end moves freely."""
+        where the file starts [m or rad]; or what it holds, where one end moves freely."""
         model, reading = self.model, self.reading
         objects = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
         data, weld = model.eq_data[k], model.eq_type[k] == mujoco.mjtEq.mjEQ_WELD
@@ -108,7 +123,7 @@ class Constraints:
         bodies = [int(model.site_bodyid[o]) if at_sites else o for o in objects]
         names = [self.tree.link_of(reading.root(body)) for body in bodies]
         if names[0] is None or names[1] is None:
-            return None
+            return self._free(bodies)
         pose = reading.site_pose if at_sites else reading.pose
         frames = [pose(o, self.data) for o in objects]
         if at_sites:

@@ -145,7 +145,7 @@ class OwnFile:
         """As `Simulator.command`, by the file's own actuators."""
         for k, drive in self._drives:
             lead = (drive.damping * velocity[k] + effort[k]) / drive.stiffness
-            self.data.ctrl[drive.numbers] = drive.controls(position[k] + lead)
+            self.data.ctrl[drive.channels] = drive.controls(position[k] + lead)
 
     def joint_state(self) -> FloatArray:
         """As `Simulator.joint_state`: from the posture in which the file is written."""

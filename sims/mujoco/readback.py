@@ -94,7 +94,7 @@ class ReadBack(readback.ReadBack):
             "ground/height": self.data.geom_xpos[self.at.ground, 2],
         }
 
-    def closures(self) -> list[FloatArray]:
+    def closures(self) -> list[tuple[FloatArray, bool]]:
         return closed(self.model, self.active)
 
     def coupling(self, pair: Coupling) -> FloatArray:
@@ -263,7 +263,8 @@ class ReadBack(readback.ReadBack):
         ]
         ends = [abs(end) for range_, limited in ranges if limited for end in range_]
         spring = np.ravel(model.jnt_stiffness[joint])[0]
-        return {
+        rest = {"rest": model.qpos_spring[model.jnt_qposadr[joint]]} if spring else {}
+        return rest | {
             "axis": np.concatenate([still, axis] if slides else turning),
             "limits": limits,
             "effort_limit": one_value(ends or np.inf),

@@ -113,7 +113,8 @@ class Reading:
         return DescriptionError(f"{self.path}: {why}")
 
     def name(self, kind: str, number: int) -> str:
-        return getattr(self.model, kind)(number).name or f"{kind} {number}"
+        which = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        return mujoco.mj_id2name(self.model, which, number) or f"{kind} {number}"
 
     # What there is
 
@@ -331,7 +332,7 @@ class Reading:
         self.scene = Scene(
             Path(self.path).stem.strip(" .") or "scene",
             tuple(p.body for p in self.placed),
-            tree.robot(self.lift, together) if self.links else None,
+            tree.robot(self.lift, together),
             gravity=vector3(model.opt.gravity) if self.falls else (0.0, 0.0, 0.0),
             ground_friction=friction,
             room=vector3(room),

@@ -77,8 +77,10 @@ TOLD_ON_JOINTS: dict[str, tuple[str, str, bool]] = {
     "dof_solref": FRICTION,
     "dof_solimp": FRICTION,
     "dof_dampingpoly": TOLD["dof_dampingpoly"],
+    "eq_solref": ("equality solref", "what is held together is as stiff as an engine has it", True),
+    "eq_solimp": ("equality solimp", "what is held together is as stiff as an engine has it", True),
 }
-"""The same of hinges and sliders."""
+"""The same of hinges and sliders, their actuators, and what holds links together."""
 
 HELD_BY_DRIVES = frozenset(
     ("jnt_limited", "jnt_range", "jnt_stiffness", "dof_armature", "dof_frictionloss")
@@ -95,6 +97,9 @@ DERIVED = frozenset(
         "simple subtreemass treeid user weldid",
         "jnt": "actuatorid axis bodyid dofadr group plasticadr pos qposadr type user",
         "dof": "M0 Madr bodyid damping invweight0 jntid length parentid simplenum treeid",
+        "actuator": "acc0 actadr armature biasprm biastype ctrladr ctrllimited ctrlrange ctrlspec "
+        "damping forcelimited forcerange gainprm gear group historyadr length0 outadr trnid user",
+        "eq": "active0 data obj1id obj2id objtype type",
     }.items()
     for name in names.split()
 )
@@ -103,13 +108,11 @@ DERIVED = frozenset(
 HELD = "it does not act in the scene: what it holds or moves behaves otherwise"
 
 OBJECTS = {
-    "nu": ("actuator", HELD),
     "ntendon": ("tendon", HELD),
-    "neq": ("equality", HELD),
     "nflex": ("flex", "soft bodies are left out"),
     "nplugin": ("plugin", HELD),
     "nkey": ("key", "tests may take it as a start; its velocities are not read"),
     "nsensor": ("sensor", "nothing reads it"),
-    "npair": ("pair", "pairs have the friction of their surfaces"),
+    "npair": ("pair", "pairs have the friction and the softness of their surfaces"),
 }
 """By the model's count of them: what they are called, and what that they are left out means."""

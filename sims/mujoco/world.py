@@ -252,12 +252,12 @@ def close_loops(spec: Any, prepared: PreparedRobot) -> None:
         )
 
 
-def closed(model: Any, active: Any) -> list[FloatArray]:
+def closed(model: Any, active: Any) -> list[tuple[FloatArray, bool]]:
     """The points of each active closure, held by two sites or, as with Newton, by two bodies with a
-    point each."""
+    point each, and whether it is a weld."""
     kinds = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
     loops = np.flatnonzero(np.isin(model.eq_type, kinds) & active)
-    return [_points(model, number) for number in loops.tolist()]
+    return [(_points(model, k), model.eq_type[k] == kinds[1]) for k in loops.tolist()]
 
 
 def _points(model: Any, number: int) -> FloatArray:

@@ -72,6 +72,9 @@ class ODE(Simulator):
                 "ODE has no couplings: contacts of each step are one, of which it tells whose",
                 only="coupling",
             ),
+            Deviation(
+                "joint/*/rest", "a spring is a motor, told before each step how fast to move"
+            ),
             Deviation("body/*/margin link/*/margin", "ODE's shapes have no margin"),
             Deviation("", "what sleeps has no contacts, and so no forces"),
             Deviation(

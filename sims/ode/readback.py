@@ -55,8 +55,8 @@ class ReadBack(readback.ReadBack):
         held = part.body.getNumJoints() > self.contacts.on(part.body)
         return {"dynamic": float(not held), "velocity": velocity, **self.inertial(part)}
 
-    def closures(self) -> list[FloatArray]:
-        return [self._points(joint) for joint in self.loops]
+    def closures(self) -> list[tuple[FloatArray, bool]]:
+        return [(self._points(joint), isinstance(joint, ode.HingeJoint)) for joint in self.loops]
 
     def coupled(self, pairs: tuple[Coupling, ...]) -> bool:
         return all(self.drives.pinions[pair.follower].holds for pair in pairs)

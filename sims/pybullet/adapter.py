@@ -68,6 +68,7 @@ class PyBullet(Simulator):
                 "joint/*/stiffness joint/*/damping",
                 "position motors are velocity constraints, neither springs nor dampers",
             ),
+            Deviation("joint/*/rest", "the adapter pushes springs of joints; Bullet has none"),
             Deviation(
                 "",
                 "damping and springs of joints are pushed by the adapter, once a step",

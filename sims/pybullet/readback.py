@@ -70,7 +70,7 @@ class ReadBack(readback.ReadBack):
             "axis": self._axis(joint),
         }
 
-    def closures(self) -> list[FloatArray]:
+    def closures(self) -> list[tuple[FloatArray, bool]]:
         return [points(self.c, closure) for closure in self.loops]
 
     def touches(self) -> dict[str, Any]:

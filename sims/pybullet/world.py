@@ -191,11 +191,12 @@ def close_loop(
     return made
 
 
-def points(client: int, constraint: int) -> FloatArray:
-    """Of a closure, in the frames of its links, (2, 3) [m]."""
+def points(client: int, constraint: int) -> tuple[FloatArray, bool]:
+    """Of a closure, in the frames of its links, (2, 3) [m]; whether it is a weld."""
     info = pybullet.getConstraintInfo(constraint, physicsClientId=client)
     body, ends = info[0], ((info[1], info[6]), (info[3], info[7]))
-    return np.array([(inertial_frame(client, body, link) * Pose(at)).position for link, at in ends])
+    found = [(inertial_frame(client, body, link) * Pose(at)).position for link, at in ends]
+    return np.array(found), info[4] == pybullet.JOINT_FIXED
 
 
 def inertial_frame(client: int, body: int, link: int) -> Pose:

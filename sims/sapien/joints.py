@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import Coupling, Joint
 from pytest_simbench.simulator import NotSupportedError, lazy_import
 
@@ -44,21 +45,24 @@ def _beside(joint: Any, damping: float, impulse: float) -> Any:
     return made
 
 
-def own_of(joint: Any, made: list[Any], timestep: float) -> tuple[float, float, float]:
-    """Stiffness, damping and friction of a joint by such constraints."""
+def own_of(joint: Any, made: list[Any], timestep: float) -> tuple[float, float, float, Any]:
+    """Stiffness, damping and friction of a joint by such constraints, and where its spring is at
+    rest; None: it has none."""
     stiffness = damping = friction = 0.0
+    rest = None
     for beside in made:
         limit, drive = (
             (beside.get_limit_x(), beside.get_drive_property_x())
             if _slides(joint)
             else (beside.get_limit_twist(), beside.get_drive_property_twist())
         )
-        stiffness += limit[2]
+        if limit[2]:
+            stiffness, rest = stiffness + limit[2], one_value(limit[:2])
         if drive[2] < BOUNDLESS / 2:
             friction += drive[2] / timestep
         else:
             damping += drive[1]
-    return stiffness, damping, friction
+    return stiffness, damping, friction, rest
 
 
 def _slides(joint: Any) -> bool:

@@ -97,11 +97,11 @@ class ReadBack(readback.ReadBack):
 
     def joint(self, name: str) -> dict[str, Any]:
         joint, own, position = self.joints[name]
-        stiffness, damping, friction = own_of(joint, own, self.system.timestep)
+        stiffness, damping, friction, rest = own_of(joint, own, self.system.timestep)
         frame = _pose(joint.pose_in_child)  # which turns about, or moves along, its x axis
         axis, still = frame.rotation()[:, 0], np.zeros(3)
         turning = [axis, np.cross(frame.position, axis)]
-        return {
+        return ({} if rest is None else {"rest": rest}) | {
             "axis": np.concatenate([still, axis] if "prism" in joint.type else turning),
             "limits": joint.limits[0],
             "effort_limit": joint.force_limit,
@@ -112,8 +112,10 @@ class ReadBack(readback.ReadBack):
             "initial_position": position,
         }
 
-    def closures(self) -> list[FloatArray]:
-        return [np.array([made.pose_in_parent.p, made.pose_in_child.p]) for made in self.made]
+    def closures(self) -> list[tuple[FloatArray, bool]]:
+        points = [np.array([made.pose_in_parent.p, made.pose_in_child.p]) for made in self.made]
+        welds = [made.get_drive_property_slerp()[0] > 0 for made in self.made]
+        return list(zip(points, welds, strict=True))
 
     def collide(self, first: Any, second: Any) -> Any:
         """By PhysX's filter as SAPIEN sets it; two links that one joint joins never do."""

@@ -193,7 +193,7 @@ TOLD = {
     "actuator": SMALL.replace(
         "</worldbody>", '</worldbody><actuator><motor joint="f"/></actuator>'
     ),
-    "equality": SMALL.replace(
+    "equality (weld)": SMALL.replace(
         "</worldbody>",
         '</worldbody><equality><weld body1="box" body2="ball"/></equality>',
     ),

@@ -163,6 +163,14 @@ def of_drives(**factors: float) -> Lie:
     return lambda scene: scene if scene.robot is None else change(scene)
 
 
+def loose(scene: Scene) -> Scene:
+    """Welds are balls and their sockets."""
+    if scene.robot is None:
+        return scene
+    closures = tuple(replace(closure, rigid=False) for closure in scene.robot.closures)
+    return replace(scene, robot=replace(scene.robot, closures=closures))
+
+
 ECHOES: dict[str, tuple[Lie, str]] = {
     "gravity": (heavier, "free_fall"),
     "mass": (of_bodies(mass=2.0), "force_acts_for_its_time"),
@@ -175,6 +183,9 @@ ECHOES: dict[str, tuple[Lie, str]] = {
     "effort_limit": (of_drives(effort_limit=1.5), "every_effort_limit_counts"),
     "link_gravity": (with_whole_weights, "links_feel_their_share_of_gravity"),
     "armature": (of_drives(armature=0.5), "limp_arm_falls"),
+    "rotor": (of_drives(armature=0.0), "rotors_are_heavy"),
+    "rest": (of_drives(rest=0.0), "joints_have_springs"),
+    "rigid": (loose, "welded_links_are_one"),
 }
 """What a copy hides: another value of a quantity, and the law that feels it."""
 
