@@ -12,6 +12,7 @@ import shutil
 import stat
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pytest_simbench.cli.values import BadInput, refusing
@@ -32,7 +33,7 @@ from pytest_simbench.report.files import (
     write_report,
     write_tables,
 )
-from pytest_simbench.report.model import sweep
+from pytest_simbench.report.model import sweep, transfer
 from pytest_simbench.report.model.outcome import RunOutcome
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.page import PAGE_NAME
@@ -186,6 +187,9 @@ def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, 
     tables where `verbose`."""
     for scene in written.scenes:
         yield scene.title.lower(), for_terminal(render_section(scene, width, titled=False))
+    for policies in map(transfer.section, written.transfers):
+        shown = replace(policies, tables=policies.tables[: None if verbose else 1])
+        yield shown.title.lower(), for_terminal(render_section(shown, width, titled=False))
     if written.summaries or written.sweeps:
         claims = [claim_lines(written.claims, width), ""] if written.claims else []
         brief = [s for s in written.summaries if s.task != SETTLING or not written.settled]

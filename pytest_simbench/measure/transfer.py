@@ -104,7 +104,8 @@ def two_runs(outcomes: Array, seeds: int) -> tuple[Array, Array]:
     spread = rates.var(ddof=1)
     pull = math.sqrt(max(0.0, 1 - noise / spread)) if spread else 0.0
     away = (pull - 1) * (rates - rates.mean())
-    drawn = (rng.multinomial(seeds, [1 / n] * n, DRAWS) @ outcomes.T / seeds for _ in range(2))
+    kinds, often = np.unique(outcomes, axis=1, return_counts=True)  # equal seeds are drawn together
+    drawn = (rng.multinomial(seeds, often / n, DRAWS) @ kinds.T / seeds for _ in range(2))
     first, second = (np.round(seeds * np.clip(run + away, 0, 1)) for run in drawn)
     return first, second
 
@@ -180,10 +181,9 @@ class Transfer:
 
     @cached_property
     def _sums(self) -> tuple[Array, Array]:
-        """Successes (simulators, policies), and those of resampled seeds, (..., draws, policies)."""
-        weights = np.random.default_rng(SEED).multinomial(
-            self.seeds, [1 / self.seeds] * self.seeds, DRAWS
-        )
+        """Successes (simulators, policies), and those of resampled seeds, with draws between."""
+        n = self.seeds
+        weights = np.random.default_rng(SEED).multinomial(n, [1 / n] * n, DRAWS)
         return self.outcomes.sum(-1), np.moveaxis(self.outcomes @ weights.T, -1, 1)
 
     @cached_property
@@ -201,6 +201,12 @@ class Transfer:
             )
             for (i, j), p_value in zip(places, p_values, strict=True)
         }
+
+    def tau(self, first: int, second: int) -> Interval:
+        """tau-b of two simulators, or the ceiling of one."""
+        if first == second:
+            return self.ceilings[first].tau
+        return self.pairs[min(first, second), max(first, second)].tau
 
     @cached_property
     def mmrv(self) -> list[Interval]:
@@ -242,8 +248,8 @@ def _interval(drawn: Array, n: int, mean: float | None = None) -> Interval:
 
 
 def narrow(found: Interval) -> bool:
-    """Whether a ceiling tells rankings."""
-    return 2 * found.half_width < NARROW
+    """Whether a ceiling tells rankings; 0.8 to 1, one pair of ten, does not."""
+    return 2 * found.half_width < NARROW - 1e-9
 
 
 def transfers(records: Iterable[Record]) -> list[Transfer]:

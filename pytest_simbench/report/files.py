@@ -108,7 +108,7 @@ def _draw(
     Returns:
         Names of the files but contact sheets; and these (PNG), by the name of their task.
     """
-    from pytest_simbench.report.figures import history, sheet, sweep, task
+    from pytest_simbench.report.figures import history, sheet, sweep, task, transfer
     from pytest_simbench.report.figures.drawing import FiguresUnavailable, write
 
     sheets: dict[str, bytes] = {}
@@ -118,7 +118,8 @@ def _draw(
         for name, drawn in sheets.items():
             failed += filter(None, [_written(folder, sheet.sheet_name(name), drawn)])
         every = task.pictures(report.tasks), history.pictures(report.histories)
-        paths = write(folder, chain(*every, sweep.pictures(report.sweeps)))
+        ranks = transfer.pictures(report.transfers)
+        paths = write(folder, chain(*every, sweep.pictures(report.sweeps), ranks))
         return [path.name for path in paths], sheets
     except FiguresUnavailable as error:
         told.append(str(error))

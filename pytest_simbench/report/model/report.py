@@ -9,9 +9,10 @@ from pytest_simbench.measure.history import History, histories, law_histories
 from pytest_simbench.measure.settling import TASK as SETTLING
 from pytest_simbench.measure.settling import Settled, settlings
 from pytest_simbench.measure.sweep import Swept, sweeps
+from pytest_simbench.measure.transfer import Transfer, transfers
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.model import settling, sweep, tables, truth
+from pytest_simbench.report.model import settling, sweep, tables, transfer, truth
 from pytest_simbench.report.model.claims import Claims, claims_of
 from pytest_simbench.report.model.document import Section
 from pytest_simbench.report.model.outcome import Compared
@@ -28,6 +29,7 @@ class Report:
         histories: of simulators of which there are several releases.
         sweeps: laws over time steps.
         settled: users' scenes, beside their noise.
+        transfers: policies on several simulators.
         claims: what the tests claimed, and what came of it, which comes first.
         comparison: with a baseline, where there is one.
     """
@@ -37,6 +39,7 @@ class Report:
     histories: Sequence[History] = ()
     sweeps: Sequence[Swept] = ()
     settled: Sequence[Settled] = ()
+    transfers: Sequence[Transfer] = ()
     claims: Claims | None = None
     comparison: Compared | None = None
 
@@ -54,6 +57,7 @@ class Report:
             [*histories(tests, reading.metrics), *law_histories(reading.records)],
             sweeps(reading.records, reading.metrics),
             settlings(reading.records),
+            transfers(records),
             claims_of(reading, comparison[1] if comparison else None),
             comparison,
         )
@@ -65,10 +69,11 @@ class Report:
 
     @property
     def sections(self) -> list[Section]:
-        """Users' scenes, laws, time steps, tasks, and releases."""
+        """Users' scenes, policies, laws, time steps, tasks, and releases."""
         laws = filter(None, [truth.section(self.summaries), sweep.section(self.sweeps)])
         told = [Section(f"History: {one.title}", one.sentences()) for one in self.histories]
-        return [*self.scenes, *laws, *map(tables.section, self.tasks), *told]
+        first = [*self.scenes, *map(transfer.section, self.transfers)]
+        return [*first, *laws, *map(tables.section, self.tasks), *told]
 
     @property
     def scenes(self) -> list[Section]:

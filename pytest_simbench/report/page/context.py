@@ -5,6 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from pytest_simbench.report.model import (
     repeatability,
     sweep,
     tables,
+    transfer,
     truth,
 )
 from pytest_simbench.report.model.answer import headline
@@ -24,7 +26,7 @@ from pytest_simbench.report.model.claims import command
 from pytest_simbench.report.model.document import Of, Table
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import Cause, Row, TaskSummary
-from pytest_simbench.report.page.pictures import of_sweeps, pictures
+from pytest_simbench.report.page.pictures import of_sweeps, of_transfers, pictures
 from pytest_simbench.report.page.setup import setup
 from pytest_simbench.report.page.strips import strips
 from pytest_simbench.report.replay.recorded import Group, links, videos
@@ -48,6 +50,8 @@ def page(
     repetitions = _Repetitions(folder, replays)
     drawn = [pictures(summary) for summary in tasks]
     swept, problem = of_sweeps(report.sweeps)
+    ranks, _ = of_transfers(report.transfers)
+    transfers = [transfer.section(found) for found in report.transfers]
     again, problems = repeatability.found_in(folder)
     laws = len(truth.laws(summaries))
     subjects = [f"{laws} law{'s' * (laws > 1)}"] * bool(laws) + [found.task for found in tasks]
@@ -57,7 +61,7 @@ def page(
         "claims": report.claims,
         "title": " and ".join(subjects) or ("time steps" if report.sweeps else "repeatability"),
         "answer": [
-            *(sentence for scene in report.scenes for sentence in scene.sentences),
+            *(sentence for told in [*report.scenes, *transfers] for sentence in told.sentences),
             *truth.sentences(summaries),
             *headline(tasks),
         ],
@@ -65,6 +69,7 @@ def page(
         "problems": dict.fromkeys(filter(None, [*(why for _, why in drawn), *problems, problem])),
         "filters": {name: found for name, found in choices.items() if len(found) > 1},
         "scenes": report.scenes,
+        "transfers": list(zip_longest(transfers, ranks)),
         "carried": carried.sections(folder),
         "truth": truth.section(summaries),
         "sweep": sweep.section(report.sweeps),

@@ -11,7 +11,8 @@ from xml.etree import ElementTree
 
 from pytest_simbench.ground.names import digest
 from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.report.figures import sweep
+from pytest_simbench.measure.transfer import Transfer
+from pytest_simbench.report.figures import sweep, transfer
 from pytest_simbench.report.figures.drawing import FiguresUnavailable, drawing
 from pytest_simbench.report.figures.task import draw
 from pytest_simbench.report.model.summary import TaskSummary
@@ -51,6 +52,14 @@ def of_sweeps(found: Sequence[Swept]) -> tuple[list[Picture], str]:
         (sweep.caption(of, over), ("sweep", of, over), partial(sweep.draw, found, of, over))
         for of in phenomena(found)
         for over in sweep.OVER
+    )
+
+
+def of_transfers(found: Sequence[Transfer]) -> tuple[list[Picture], str]:
+    """The picture of each; and a sentence where there are none and why."""
+    return _drawn(
+        (transfer.CAPTION, ("transfer", str(place)), partial(transfer.draw, one))
+        for place, one in enumerate(found)
     )
 
 
