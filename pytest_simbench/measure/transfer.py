@@ -34,6 +34,7 @@ It errs by up to 0.1, in both directions; of equal rates in two groups it is too
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -53,11 +54,14 @@ METRIC, POLICY, REFERENCE = "success", f"{TASK}policy", f"{TASK}reference"
 """The metric, and parameters of the task: name of the policy, and of the simulator by which MMRV is
 told (the first one where there is none). Others of a policy begin with `task.policy` too."""
 
+DIGEST = f"{POLICY}_digest"
+"""What tells apart two policies of one name."""
+
 DRAWS = 1999
 """Of every resampling; pairs of eight simulators are told apart with so many."""
 
 NARROW = 0.2
-"""A ceiling's interval that is less wide tells rankings."""
+"""A ceiling's interval that is no wider tells rankings."""
 
 MOST = 10_000
 """Seeds beyond which no number is told."""
@@ -248,8 +252,8 @@ def _interval(drawn: Array, n: int, mean: float | None = None) -> Interval:
 
 
 def narrow(found: Interval) -> bool:
-    """Whether a ceiling tells rankings; 0.8 to 1, one pair of ten, does not."""
-    return 2 * found.half_width < NARROW - 1e-9
+    """Whether a ceiling tells rankings; so does 0.8 to 1, one pair of five policies."""
+    return 2 * found.half_width <= NARROW + 1e-9
 
 
 def transfers(records: Iterable[Record]) -> list[Transfer]:
@@ -269,11 +273,15 @@ def _work(record: Record) -> tuple[Any, ...]:
 def _transfer(records: Sequence[Record]) -> Transfer | None:
     """Policies come in the order of their success in all simulators."""
     found: dict[Who, dict[str, dict[int, float]]] = {}
+    names = {(r.settings[POLICY], r.settings.get(DIGEST)) for r in records}
+    twice = Counter(name for name, _ in names)
     for r in records:
         value = 0.0 if r.status == "failed" else r.metrics.get(METRIC)
         if r.status != "interrupted" and value is not None:
             of = found.setdefault((r.simulator, r.mode, r.profile), {})
-            of.setdefault(str(r.settings[POLICY]), {})[r.seed] = float(value)
+            name = str(r.settings[POLICY])
+            name += f" {str(r.settings.get(DIGEST))[:6]}" if twice[name] > 1 else ""
+            of.setdefault(name, {})[r.seed] = float(value)
     policies = sorted({policy for of in found.values() for policy in of})
     whole = [who for who, of in found.items() if len(of) == len(policies)]
     every = [found[who][policy].keys() for who in whole for policy in policies]

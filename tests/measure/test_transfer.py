@@ -111,12 +111,12 @@ def test_the_ceiling_is_that_of_the_true_rates(rates: Array, truth: float, off: 
 
 
 def test_how_many_seeds_make_the_ceiling_narrow() -> None:
-    """340 by the true rates; 80 seeds that have them exactly say about as many."""
-    for seeds, narrow in (280, False), (400, True):
+    """0.2 wide from 137 on by the true rates, narrower from 340 on, where no order is wrong; 80
+    seeds that have the rates exactly say about as many."""
+    for seeds, low in (120, 0.7), (160, 0.8), (280, 0.8), (400, 0.9):
         first, second = np.split(runs(SPREAD, seeds, 20_000), 2)
-        width = np.ptp(np.quantile(tau_b(first, second), [0.025, 0.975]))
-        assert (width < 0.2 - 1e-9) == narrow
-    assert 300 < (exactly(SPREAD, 80).needed or 0) < 480
+        assert np.quantile(tau_b(first, second), 0.025) == pytest.approx(low, abs=0.06)
+    assert 120 < (exactly(SPREAD, 80).needed or 0) < 200
     assert exactly(np.full(5, 0.8), 20).needed is None
 
 
