@@ -33,8 +33,7 @@ def draw(found: Transfer) -> Any:
     axis = figure.subplots()
     # Squares and no image: the page takes vectors alone. Blue is 1, red -1.
     values = [[tau.mean for tau in row] for row in shown]
-    mesh = axis.pcolormesh(values, cmap="RdBu", vmin=-1, vmax=1)
-    figure.colorbar(mesh, ax=axis, label="tau-b")
+    axis.pcolormesh(values, cmap="RdBu", vmin=-1, vmax=1)
     for i in many:
         for j in many:
             strong = abs(shown[i][j].mean) > 0.6

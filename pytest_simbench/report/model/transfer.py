@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pytest_simbench.measure.intervals import Interval
-from pytest_simbench.measure.transfer import METRIC, Transfer
+from pytest_simbench.measure.transfer import METRIC, NARROW, Transfer
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report.model import cells
 from pytest_simbench.report.model.document import Cell, Column, Of, Section, Table, listed, names
@@ -18,12 +18,12 @@ NAMED = 3
 
 READING = (
     "tau-b is 1 where two simulators order policies alike and -1 where one reverses the other's; "
-    "in brackets its 95 % interval. On the diagonal stands the ceiling: a "
-    "simulator against itself on other seeds."
+    "in brackets its 95 % interval. On the diagonal stands the ceiling: a simulator against itself "
+    "on other seeds."
 )
 VIOLATED = (
     "MMRV: success points in the reference that the worst wrong order of a policy costs, mean of "
-    "the policies. Seeds: about how many make the ceiling's interval narrower than 0.2."
+    f"the policies. Seeds: about how many make the interval of the ceiling at most {NARROW} wide."
 )
 
 COLOURED = {"different": "apart", "open": "open"}
@@ -50,19 +50,19 @@ def sentences(found: Transfer) -> list[str]:
     for place, _ in sorted(found.pairs.items(), key=lambda item: np.nan_to_num(item[1].tau.mean)):
         places.setdefault(found.verdict(*place), []).append(place)
     untold = sorted({k for pair in places.get("open", ()) for k in pair})
-    needed = [number for k in untold if (number := own[k].needed)]
+    needed = max([own[k].needed or 0 for k in untold], default=0)
     lost = listed([known[k] for k in untold if not own[k].needed], NAMED)
     heads = {
         "different": "Ranks differ by more than the noise",
         "alike": "As alike as two runs of one engine",
         "open": f"Cannot be told with {found.seeds} seeds"
-        + (f", about {_rounded(max(needed))} are needed" if needed else "")
-        + (f" (no number tells, as alike as policies succeed on {lost})" if lost else ""),
+        + (f", about {_rounded(needed)} are needed" if needed > found.seeds else "")
+        + (f"; on {lost} policies succeed too equally for any number" if lost else ""),
     }
     told = []
     for verdict, head in heads.items():
         pairs = [
-            f"{known[i]} and {known[j]} (tau-b {interval(found.tau(i, j))}; against themselves "
+            f"{known[i]} and {known[j]} (tau-b {interval(found.tau(i, j))}, ceilings "
             f"{_number(own[i].tau.mean)} and {_number(own[j].tau.mean)})"
             for i, j in places.get(verdict, ())
         ]
