@@ -53,7 +53,7 @@ class Joint(Wire):
         spring: stiffness of a spring in the joint [N m/rad], or [N/m].
         rest: position at which that spring is without load [rad], or [m].
         gravity: share of the scene's gravity that the link which it moves feels; 0: its weight is
-            compensated. At most 1: MuJoCo passes over more where no link has less.
+            compensated. At most 1: engines may pass over more.
     """
 
     optional = ("passive_damping", "friction", "spring", "rest", "gravity")
