@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 import pytest_simbench as simbench
+from pytest_simbench.cli.main import main
 from pytest_simbench.client.errors import Unavailable, WorkerExited
 from pytest_simbench.motion.registry import find
 from pytest_simbench.records.folder import RunFolder
@@ -119,6 +120,17 @@ def test_a_run_is_gone_on_with(scripted: dict[str, Any]) -> None:
         simbench.run(Falling(), "mujoco", reps=2, resume=True)
 
 
+def test_the_command_merges_and_reports(
+    scripted: dict[str, Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for folder, seed in (("a", 1), ("b", 3)):
+        simbench.run(Falling(), TWO, reps=2, seed=seed, folder=folder, quiet=True)
+    capsys.readouterr()
+    assert main(["merge", "a", "b", "--output", "c"]) == main(["report", "c"]) == 0
+    assert capsys.readouterr().out.count("falling: 4 repetitions each, protocol fast") == 2
+    assert len(simbench.load("c").contents.records) == 8
+
+
 BAD: dict[str, tuple[dict[str, Any], str]] = {
     "class": ({"task": Falling}, "a class instead of a task: write run(Falling())"),
     "task": ({"task": 3}, "run(3) takes a task, for instance run(Throwing())"),
@@ -207,3 +219,25 @@ def test_ctrl_c_keeps_records_and_ends_workers(tmp_path: Path, jobs: int) -> Non
     kept = simbench.load(tmp_path / "out").contents.every
     assert [record.status for record in kept] == ["interrupted"] * jobs
     assert workers() <= before
+
+
+def test_pytest_compares_with_it(pytester: pytest.Pytester) -> None:
+    simbench.run(Falling(0.1), "mujoco", reps=2, folder="before", quiet=True)
+    pytester.makepyfile(
+        """
+        from tests.tiny import Falling
+
+        def test_falling(repeat):
+            repeat(Falling(0.1))
+        """
+    )
+    options = ("--sim=mujoco", "--reps=2", "--sim-baseline=before", "--sim-output=now")
+    result = pytester.runpytest_subprocess(*options)
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["baseline: *before", "*landed *0 % *0 % *no clear change"])
+    result.stdout.no_fnmatch_line("*different in the baseline*")
+    again = simbench.load("now").compare("before")
+    assert "landed" in str(again)
+    same = [simbench.load(name).contents.records[0].to_dict() for name in ("before", "now")]
+    differ = {key for key in same[0] if same[0][key] != same[1][key]}
+    assert differ <= {"test", "function", "seconds", "stepping", "timeline", "resources", "notes"}
