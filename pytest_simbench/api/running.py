@@ -160,7 +160,9 @@ def _chosen(
         check(chosen, makes=False)
     if len(chosen.robots) > 1:
         raise BadInput(f"robot={robot}: give one of {', '.join(filter(None, chosen.robots))}")
-    return chosen.ready()
+    if not (ready := chosen.ready()).simulators:
+        raise BadInput("no simulator is ready here: `simbench list` says how to get one")
+    return ready
 
 
 def _experiments(

@@ -175,6 +175,12 @@ def test_a_simulator_that_is_not_here_says_how_to_get_it() -> None:
         simbench.run(Falling(), "mujoco==99.0")
 
 
+def test_a_machine_without_any_says_where_to_look(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pytest_simbench.client.environments.missing", lambda info: "not here")
+    with pytest.raises(simbench.BadInput, match="no simulator is ready here: `simbench list`"):
+        simbench.run(Falling())
+
+
 def test_names_are_imported_when_they_are_asked_for() -> None:
     """An unrelated pytest run pays for nothing of it."""
     code = (
