@@ -33,8 +33,12 @@ from pytest_simbench.records.tuned_on import FIRST_SEED
 from pytest_simbench.report.files import write_outcome
 from pytest_simbench.report.model.outcome import RunOutcome, looks_at
 from pytest_simbench.scene import Robot
+from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.simulator.registry import adapter, known
 from pytest_simbench.tasks.base import Task
+
+REFUSED = (SimulatorError, RecordError, DisplayError, NotResumed, ExecutorError, LoopError)
+"""What becomes bad input, in its own words."""
 
 
 def run(
@@ -94,7 +98,7 @@ def run(
         closing(_locked(folder, resume)) as place,
         closing(Displays()) as displays,
         closing(LocalExecutor(at_once)) as executor,
-        refusing((SimulatorError, RecordError, DisplayError, NotResumed, ExecutorError)),
+        refusing(REFUSED),
     ):
         resumed = Resumed(place) if resume else None
         problems = resumed.repair() if resumed else []

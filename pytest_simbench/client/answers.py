@@ -82,6 +82,7 @@ ANSWERS: dict[str, Any] = {
     "state": State,
     "follow": Moved,
     "wait": Moved,
+    "close_loop": Moved,
     "save": None,
     "restore": State,
     "contact_count": int,

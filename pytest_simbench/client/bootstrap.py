@@ -115,7 +115,7 @@ def main(channel: Any) -> None:
 
     from pytest_simbench.worker.server import serve
 
-    serve(requests_of(channel).get, channel.send)
+    serve(requests_of(channel).get, channel.send, config["exchange"])
     # Windows and engines may crash while the interpreter tears them down; everything is sent.
     sys.stdout.flush()
     sys.stderr.flush()

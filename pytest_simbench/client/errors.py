@@ -108,6 +108,10 @@ class EngineFailed(WorkerError):
     remote = ""
 
 
+class PolicyFailed(WorkerError):
+    """A policy raised, stalled, or answered what is no command."""
+
+
 class ExecutorError(Exception):
     """Nothing can be carried out any more: a cluster is gone, for instance. One sentence."""
 
@@ -122,6 +126,7 @@ REMOTE_ERRORS: dict[str, type[WorkerError]] = {
     "StateError": BadState,
     "MemoryError": OutOfMemory,
     "UnavailableError": Unavailable,
+    "PolicyError": PolicyFailed,
     "SystemExit": WorkerExited,
 }
 """Worker-side error names and what they become here; all others are `EngineFailed`."""

@@ -7,7 +7,7 @@ import importlib.util
 import shutil
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from packaging.utils import canonicalize_version
 from pytest_simbench import __version__
 from pytest_simbench.client import bootstrap, reaper
 from pytest_simbench.client.answers import Constructed, Frame, checked
-from pytest_simbench.client.connection import Connection, RemoteError
+from pytest_simbench.client.connection import Connection, RemoteError, elsewhere
 from pytest_simbench.client.errors import (
     REMOTE_ERRORS,
     EngineFailed,
@@ -127,12 +127,12 @@ class WorkerProcess:
             "log": str(log or ""),
             "folder": str(log.parent.absolute()) if log and log.parent != Path("/dev") else "",
             "packages": self._packages(),
+            "exchange": self._connection.descriptor,
         }
 
     @property
     def _elsewhere(self) -> bool:
-        spec = self.launch.spec
-        return spec is not None and not spec.startswith("popen")
+        return elsewhere(self.launch.spec)
 
     def _packages(self) -> dict[str, str]:
         """Where the packages that the worker needs lie: this one, the adapters, a third party's."""
@@ -153,12 +153,38 @@ class WorkerProcess:
         Raises:
             WorkerError: one of its kinds; the worker is dead then, unless it is `EngineFailed`.
         """
+        self._ask(operation, arguments)
+        return self._answer(operation, self._next(timeout, self._hung))
+
+    def converse(self, operation: str, **arguments: Any) -> Generator[bytes, bytes | None, Any]:
+        """A request during which the worker asks back: yields its questions, takes the replies.
+
+        Closing the generator ends the operation, as the reply None does; errors as `request`.
+
+        Returns:
+            The answer to the request.
+        """
+        self._ask(operation, arguments)
+        connection = self._connection
+        while isinstance(message := self._next(None, self._hung, connection.take), bytes):
+            try:
+                reply = yield message
+            except GeneratorExit:
+                connection.reply(None)
+                self._answer(operation, self._next(None, self._hung, connection.take))
+                raise
+            connection.reply(reply)
+        return self._answer(operation, message)
+
+    def _ask(self, operation: str, arguments: Mapping[str, Any]) -> None:
         if self._connection.unread and not self._ended:
             self._unread()
         self.busy = True
         self._asked += 1
         self._connection.send({"op": operation, "number": self._asked, **pack(arguments)})
-        answer = self._next(timeout, self._hung)
+
+    def _answer(self, operation: str, answer: Any) -> Any:
+        """What a message answers to the last request; errors as `request`."""
         self.busy = False
         try:
             if answer["number"] != self._asked:
@@ -244,13 +270,20 @@ class WorkerProcess:
         message = self._next(EXIT_TIMEOUT, self._hung)
         raise self._ended_by(ProtocolError, f"{message!r:.80} came, and nobody had asked")
 
-    def _next(self, timeout: float | None, late: Callable[[float], WorkerError]) -> Any:
+    def _next(
+        self,
+        timeout: float | None,
+        late: Callable[[float], WorkerError],
+        receive: Callable[[float], Any] | None = None,
+    ) -> Any:
         """The worker's next message.
 
         Args:
             timeout: [s]; None: the limit of silence.
             late: the error when that time is over.
+            receive: from where; default: `Connection.receive`.
         """
+        receive = receive or self._connection.receive
         began = time.monotonic()
         limit = self.launch.stall_timeout if timeout is None else timeout
         while True:
@@ -263,7 +296,7 @@ class WorkerProcess:
             if now >= until:
                 raise error(limit)
             try:
-                return self._connection.receive(min(until - now, LOOK_PERIOD))
+                return receive(min(until - now, LOOK_PERIOD))
             except TimeoutError:
                 continue
             except EOFError:

@@ -15,7 +15,7 @@ import numpy as np
 
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import Motion, World
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import FloatArray, Scene, SceneError
 
 ARRAYS = ("position", "velocity", "effort")
 Rows = dict[str, FloatArray]
@@ -182,6 +182,14 @@ class TapedWorld(World):
         """Carry out one operation without putting it on the tape."""
         period = log_period if log_period is not None else self.period
         return super()._move(operation.kind, period, **operation.arguments)
+
+    def control(self, policy: Any, **options: Any) -> Motion:
+        """No closed loop: its commands hang on what it sees, so there is no tape of it.
+
+        Raises:
+            SceneError: always.
+        """
+        raise SceneError("a world with a tape runs no policy; repeat a task that plans its motions")
 
     def play(self, tape: Tape) -> None:
         """Carry out the operations of a tape, one after the other."""

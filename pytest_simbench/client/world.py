@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -12,13 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.client.answers import Frame
-from pytest_simbench.client.errors import Diverged, EngineFailed
+from pytest_simbench.client.closed_loop import Episode, Looking
+from pytest_simbench.client.errors import Diverged, EngineFailed, PolicyFailed
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.description.robot_files import with_content
+from pytest_simbench.ground.errors import PolicyError
 from pytest_simbench.ground.files import FileError
-from pytest_simbench.scene import FloatArray, Pose, Scene, Trajectory
+from pytest_simbench.scene import FloatArray, Pose, Scene, SceneError, Trajectory
 from pytest_simbench.scene.checks import check_number
 from pytest_simbench.scene.plausibility import implausible
+from pytest_simbench.scene.policy import Kinematics, Observation, Policy, Rhythm, as_policy
 from pytest_simbench.simulator import DescriptionError
 
 TRACE_PERIOD = 0.02
@@ -48,6 +51,15 @@ class Motion:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    @classmethod
+    def of(cls, states: Sequence[Observation]) -> Motion:
+        """The states of observations, one at least."""
+        return cls(
+            np.array([state.time for state in states]),
+            np.array([[state.position, state.velocity] for state in states]),
+            np.array([state.bodies for state in states]),
+        )
 
     @classmethod
     def joined(cls, parts: list[Motion]) -> Motion:
@@ -115,6 +127,7 @@ class World:
         trace_period: float | None = None,
         after_phase: Callable[[World, str], None] = lambda world, name: None,
         parity: bool = True,
+        kinematics: Callable[[Scene], Kinematics] | None = None,
     ) -> None:
         self.process = process
         self.scene = scene
@@ -127,7 +140,8 @@ class World:
         self._saved: dict[str, tuple[list[Motion], list[tuple[float, str]]]] = {}
         self._trace_period = trace_period
         self._after_phase: Callable[[World, str], None] = lambda world, name: None
-        self._on_phase = on_phase
+        self._on_phase, self._kinematics = on_phase, kinematics
+        self._servo: Kinematics | None = None
         self._names = [body.name for body in scene.free_bodies]
         if process.launch.compile_timeout:
             self._compile()
@@ -201,6 +215,23 @@ class World:
             name: Pose.from_array(row) for name, row in zip(self._names, self.bodies, strict=True)
         }
 
+    @property
+    def tool(self) -> Pose:
+        """Present pose of the robot's tool centre point."""
+        return self._model().tool_pose(self.joints[0])
+
+    def _model(self) -> Kinematics:
+        """Of the robot, made once.
+
+        Raises:
+            SceneError: this world was made without.
+        """
+        if self._kinematics is None:
+            raise SceneError("this world has no model of its robot")
+        if self._servo is None:
+            self._servo = self._kinematics(self.scene)
+        return self._servo
+
     def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
         """Have the robot follow a trajectory; the motion sampled every `log_period` [s] (0: each
         step, None: no samples)."""
@@ -216,6 +247,82 @@ class World:
         __tracebackhide__ = True
         check_number(duration, "the duration [s] of a wait", 0.0, LONGEST)
         return self._move("wait", log_period, duration=float(duration))
+
+    def control(
+        self,
+        policy: Any,
+        *,
+        until: float | Callable[[Observation], bool],
+        at_most: float = 60.0,
+        rate: float | None = None,
+        seed: int | None = None,
+        command_latency: float = 0.0,
+        observation_delay: float = 0.0,
+        forces: bool = False,
+        picture: tuple[int, int] | None = None,
+        inside: bool = False,
+        goal: Pose | None = None,
+    ) -> Motion:
+        """Let a policy act: it sees, answers, and sees what came of it, at its own rate.
+
+        Args:
+            policy: see `scene.policy`: an object with `act`, or a function of an observation.
+            until: simulated seconds, or what ends the loop once it holds of an observation.
+            at_most: seconds that the loop lasts if that never holds.
+            rate: how often it is asked [Hz]; default: the policy's own.
+            seed: of its `reset`; default: the repetition's.
+            command_latency: from an observation to when its command begins to act [s].
+            observation_delay: age of what the policy is shown [s]; whole periods.
+            forces, picture: show it contact forces, and a picture of this width and height.
+            inside: run it in the worker, which takes less time than to ask it; it commands joints
+                then, its file imports what the worker has, and `until` is a time.
+            goal: what `Observation.goal` says.
+
+        Returns:
+            The states at each observation, without the first.
+
+        Raises:
+            LoopError: no robot, or a rate, latency or delay that fits no time step.
+            PolicyFailed: the policy raised, gave no answer, or one that is no command.
+        """
+        __tracebackhide__ = True
+        chosen = as_policy(policy, rate)
+        episode = Episode(
+            chosen,
+            Rhythm(
+                rate if rate is not None else getattr(chosen, "rate", Policy.rate),
+                command_latency,
+                observation_delay,
+            ),
+            until,
+            at_most,
+            seed if seed is not None else self.process.where.seed or 0,
+            Looking(forces, picture),
+            inside,
+            goal,
+        )
+        if inside:
+            period = self._trace_period or 1 / episode.rhythm.rate
+            try:
+                answer = episode.inner(self.process, self.scene, self._timestep, period)
+            except PolicyError as error:
+                raise PolicyFailed(str(error), self.process.where) from error
+            motion = Motion(**answer["log"]) if answer["log"] else self._still()
+        else:
+            answer, states, seconds = episode.outer(
+                self.process, self.scene, self._timestep, self._model()
+            )
+            self.stopwatch.add("policy", seconds)
+            motion = Motion.of(states) if states else self._still()
+        self._leave_out(answer.get("aside", 0.0))
+        if self._trace_period is not None and len(motion):
+            self.trace.append(self._thinned(motion))
+        self._take(answer)
+        return motion
+
+    def _still(self) -> Motion:
+        """No samples."""
+        return Motion(np.empty(0), self.joints[None][:0], self.bodies[None][:0])
 
     def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion | None:
         __tracebackhide__ = True

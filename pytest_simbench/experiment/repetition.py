@@ -31,6 +31,8 @@ from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, Record, Status
+from pytest_simbench.scene import Scene
+from pytest_simbench.scene.policy import Kinematics
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.registry import seeds_seen
 from pytest_simbench.tasks.base import Outcome
@@ -179,6 +181,7 @@ class Repetition:
             on_phase=self._enter,
             trace_period=self._trace_period(),
             after_phase=self._leave,
+            kinematics=kinematics,
         )
         world.watch(self.seed)
         if self._camera is not None:
@@ -268,9 +271,8 @@ class Repetition:
         case, total = self.case, self.stopwatch.elapsed()
         python = self._process.python_version if self._process else ""
         stepping = self._stats.get("stepping", {})
-        seconds = {
-            k: self.stopwatch.seconds.get(k, 0.0) for k in ("launch", "compile", "load", "plan")
-        }
+        kinds = ("launch", "compile", "load", "plan", "policy")
+        seconds = {k: self.stopwatch.seconds.get(k, 0.0) for k in kinds}
         seconds["step"] = stepping.get("wall", 0.0)
         seconds["other"] = max(0.0, total - sum(seconds.values()))
         seconds["total"] = total
@@ -354,6 +356,13 @@ class Repetition:
         except (OSError, DescriptionError) as error:
             return f"the trace could not be written: {named(error)}"
         return ""
+
+
+def kinematics(scene: Scene) -> Kinematics:
+    """Of a scene's robot; its library is loaded when a policy first asks."""
+    from pytest_simbench.motion.servo import Servo
+
+    return Servo(scene)
 
 
 def group(phase: str) -> str:

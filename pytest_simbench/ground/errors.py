@@ -32,6 +32,10 @@ class NotSupportedError(SimulatorError):
     """The adapter was asked for something that its engine does not have."""
 
 
+class PolicyError(SimulatorError):
+    """A policy raised, stalled, or answered what is no command."""
+
+
 class UnavailableError(SimulatorError):
     """This machine lacks what was asked for, a driver for instance; the message says what helps."""
 

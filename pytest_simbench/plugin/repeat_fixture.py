@@ -29,6 +29,7 @@ from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
+from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks.base import Task
 
 REFUSALS = (NotResumed, ExecutorError)
@@ -62,7 +63,7 @@ class RepeatFixture:
         )
 
         def up_to(number: int) -> list[Record]:
-            with failing(REFUSALS):
+            with failing((*REFUSALS, LoopError)):
                 return repeater.up_to(number, found)
 
         metrics = experiment.task.metrics

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -307,6 +307,15 @@ class Robot(Wire):
     def finger_indices(self) -> list[int]:
         """Where the gripper's joints stand among `joints`."""
         return [self.joint_names.index(name) for name in self.gripper.joints]
+
+    def as_motors(self) -> Robot:
+        """The same robot, the drives of its arm pushing the commanded efforts alone."""
+        arm = {joint.name for joint in self.arm_joints}
+        motors = (
+            replace(joint, stiffness=FREE, damping=0.0) if joint.name in arm else joint
+            for joint in self.joints
+        )
+        return replace(self, joints=tuple(motors))
 
     def column(self, attribute: str) -> FloatArray:
         """One attribute of all joints, (n_joints,): `robot.column("effort_limit")`."""

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.arm_following import ArmFollowing, CorrectedArmFollowing
     from pytest_simbench.tasks.arm_pushing import ArmPushing
     from pytest_simbench.tasks.base import Jitter, Moment, Outcome, Task
+    from pytest_simbench.tasks.goals import GoalTask, PickAndPlace, PushingToGoal, Reaching
     from pytest_simbench.tasks.holding import Holding
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
     from pytest_simbench.tasks.replaying import Log, Replaying
@@ -20,9 +21,9 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.towers import LeaningTowers
 
 __all__ = [
-    "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Holding", "Jitter",
-    "LeaningTowers", "Log", "Moment", "Outcome", "Pushing", "Replaying", "Settling", "Stacking",
-    "Task", "Throwing", "Tossing",
+    "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "GoalTask", "Holding",
+    "Jitter", "LeaningTowers", "Log", "Moment", "Outcome", "PickAndPlace", "Pushing",
+    "PushingToGoal", "Reaching", "Replaying", "Settling", "Stacking", "Task", "Throwing", "Tossing",
     "rests_on",
 ]  # fmt: skip
 
@@ -30,6 +31,7 @@ _MODULES = {
     "arm_following": ("ArmFollowing", "CorrectedArmFollowing"),
     "arm_pushing": ("ArmPushing",),
     "base": ("Jitter", "Moment", "Outcome", "Task"),
+    "goals": ("GoalTask", "PickAndPlace", "PushingToGoal", "Reaching"),
     "holding": ("Holding",),
     "pushing": ("CurvePushing", "Pushing"),
     "replaying": ("Log", "Replaying"),

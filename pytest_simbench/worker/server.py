@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import socket
 import sys
 import time
 import traceback
@@ -37,6 +38,9 @@ from pytest_simbench.simulator.info import (
 )
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.acting import Acting
+from pytest_simbench.worker.loop import Loop, told_forces
+from pytest_simbench.worker.loop import inside as run_inside
+from pytest_simbench.worker.loop import outside as run_outside
 from pytest_simbench.worker.state import (
     check_following,
     check_start,
@@ -45,7 +49,16 @@ from pytest_simbench.worker.state import (
 )
 from pytest_simbench.worker.stepping import Stepper
 from pytest_simbench.worker.watching import Watch
-from pytest_simbench.worker.wire import LONGEST_LOGGED, named, pack, readable, told, unpack
+from pytest_simbench.worker.wire import (
+    LONGEST_LOGGED,
+    frame,
+    framed,
+    named,
+    pack,
+    readable,
+    told,
+    unpack,
+)
 
 
 def peak_rss_mb() -> float | None:
@@ -73,8 +86,13 @@ def reset_peak_rss() -> None:
 class Server:
     """Answers the requests of one client for one simulator."""
 
-    def __init__(self, send: Callable[[Any], None]) -> None:
-        self.send = send
+    def __init__(
+        self,
+        send: Callable[[Any], None],
+        receive: Callable[[], Any] = lambda: None,
+        exchange: socket.socket | None = None,
+    ) -> None:
+        self.send, self.receive, self.exchange = send, receive, exchange
         self.simulator: Simulator | None = None
         self.stepper: Stepper | None = None
         self.scene = Scene("empty")
@@ -211,6 +229,43 @@ class Server:
     def do_wait(self, duration: float, log_period: float | None) -> dict[str, Any]:
         return self._moved(self._loaded().wait(duration, log_period))
 
+    def do_close_loop(
+        self,
+        every: int,
+        most: int,
+        late: int,
+        log_period: float | None,
+        forces: bool,
+        picture: list[int] | None,
+        inside: dict[str, Any] | None,
+    ) -> dict[str, Any]:
+        """Step under a policy: the client's, which is asked by messages, or one that runs here."""
+        stepper, period = self._loaded(), every * self._constructed().settings.timestep
+        try:
+            if inside is not None:
+                answer = run_inside(self.scene, stepper.told, period, inside)
+            else:
+                looks: list[Callable[[], bytes]] = []
+                if picture is not None:
+                    looks.append(lambda: np.asarray(self.do_render(*picture)).tobytes())
+                if forces:
+                    looks.append(lambda: told_forces(self.do_contact_forces()))
+                answer = run_outside(self._exchange, looks)
+            loop = Loop(every, most, late, stepper.told, period, answer)
+            return self._moved(stepper.close_loop(loop, log_period))
+        finally:
+            if self.exchange is not None:
+                self.exchange.sendall(frame(b""))  # no question: the answer comes
+
+    def _exchange(self, question: bytes) -> bytes | None:
+        """The client's reply to a question."""
+        if self.exchange is None:
+            self.send(question)
+            reply: bytes | None = self.receive()
+            return reply
+        self.exchange.sendall(frame(question))
+        return framed(self.exchange)
+
     def _moved(self, log: dict[str, Any]) -> dict[str, Any]:
         watch = self._loaded().watch
         if watch is not None:
@@ -319,9 +374,11 @@ def _import_engine(info: SimulatorInfo) -> None:
             ) from error
 
 
-def serve(receive: Callable[[], Any], send: Callable[[Any], None]) -> None:
-    """Answer requests until the client asks to close."""
-    server = Server(send)
+def serve(
+    receive: Callable[[], Any], send: Callable[[Any], None], exchange: int | None = None
+) -> None:
+    """Answer requests until the client asks to close; `exchange`: descriptor of a socket to it."""
+    server = Server(send, receive, None if exchange is None else socket.socket(fileno=exchange))
     while True:
         request = receive()
         closing = request.get("op") == "close"

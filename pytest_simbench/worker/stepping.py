@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from pytest_simbench.scene import FloatArray, Scene, Trajectory
 from pytest_simbench.simulator import DivergedError, Simulator
 from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.control import Clock, Control, Family
+from pytest_simbench.worker.loop import Loop, Row
 from pytest_simbench.worker.state import States
 from pytest_simbench.worker.watching import Watch
 
@@ -65,6 +66,7 @@ class Stepper:
         control: the workload that shows the machine's speed meanwhile.
         watch: what looks whether the world stays as it was loaded; None: nothing.
         real_time: wait for the wall clock after each step, as the study's simulators did.
+        told: the set points that the drives were told last.
     """
 
     def __init__(
@@ -85,25 +87,41 @@ class Stepper:
         self.film: tuple[int, Callable[[], None]] | None = None
         self.watch: Watch | None = None
         self._next_picture = 0.0
+        robot = scene.robot
+        start = np.empty(0) if robot is None else robot.column("initial_position")
+        self.told: Row = start, np.zeros_like(start), np.zeros_like(start)
 
     def follow(self, trajectory: Trajectory, log_period: float | None) -> dict[str, Any]:
         """Command the trajectory's set points step by step; see `_advance`."""
         points = trajectory.resampled(self.simulator.settings.timestep)
         rows = list(zip(points.position, points.velocity, points.effort, strict=True))
-        return self._advance(len(rows), rows, log_period)
+        self.told = rows[-1]
+        return self._advance(len(rows), iter(rows), log_period)
 
     def wait(self, duration: float, log_period: float | None) -> dict[str, Any]:
         """Step for `duration` [s] under the last command; see `_advance`."""
         steps = max(1, round(duration / self.simulator.settings.timestep))
         return self._advance(steps, None, log_period)
 
+    def close_loop(self, loop: Loop, log_period: float | None) -> dict[str, Any]:
+        """Step under the set points of a policy, until it ends or its time is over."""
+        states = self.states
+        if not loop.ask(states.time(), states.joints(), states.bodies()):
+            return {}
+        log = self._advance(loop.steps, loop.rows(), log_period, loop)
+        self.told = loop.told
+        return log
+
     def _advance(
         self,
         steps: int,
-        rows: list[tuple[FloatArray, FloatArray, FloatArray]] | None,
+        rows: Iterator[Row] | None,
         log_period: float | None,
+        loop: Loop | None = None,
     ) -> dict[str, Any]:
         """Advance by `steps`; a log sample every `log_period` [s] (0: every step; None: no log).
+
+        A loop is asked for more rows after each of its periods, and may end it all.
 
         Returns:
             The log: time (n,), joints (n, 2, n_joints), bodies (n, n_free, 13); {} where there is
@@ -120,6 +138,7 @@ class Stepper:
         watched = simulator.gui or self.real_time
         look_every = max(1, round((LOOK_PERIOD if watched else CHECK_PERIOD) / timestep))
         film_every = self.film[0] if self.film is not None else 0
+        ask_every = loop.every if loop is not None else 0
         states, from_time = self.states, self.states.time()
         samples: list[tuple[float, FloatArray, FloatArray]] = []
         watch, from_start = self.watch, self.clocks.steps
@@ -134,14 +153,15 @@ class Stepper:
         beat = resumed = began
         for k in range(1, steps + 1):
             if rows is not None:
-                command(*rows[k - 1])
+                command(*next(rows))
             if act is not None:
                 act()
             step()
             logs = log_every and k % log_every == 0
             films = film_every and (totals.steps + k) % film_every == 0
+            asks = ask_every and k % ask_every == 0
             if (
-                not (logs or films)
+                not (logs or films or asks)
                 and k % look_every
                 and k % check_every
                 and k < steps
@@ -156,15 +176,18 @@ class Stepper:
             totals.cpu += family.cpu() - cpu_began
             now = states.time_after(k, from_time)
             checks = k % check_every == 0 or k in (steps, due)
-            if logs or checks:
+            if logs or checks or asks:
                 joints, bodies = states.joints(), states.bodies()
                 if logs:
                     samples.append((now, joints, bodies))
-                if checks:
+                if checks or asks:
                     self._check_finite(now, joints, bodies)
-                    if watch is not None:
-                        watch.look(from_start + k, joints, bodies)
-                        due = watch.due - from_start
+                if checks and watch is not None:
+                    watch.look(from_start + k, joints, bodies)
+                    due = watch.due - from_start
+                if loop is not None and asks and not loop.ask(now, joints, bodies):
+                    steps = k
+                    break
             if stopped - beat > HEARTBEAT_PERIOD:
                 beat = stopped
                 self.heartbeat(now)
@@ -182,6 +205,9 @@ class Stepper:
             keep_up(min(totals.wall, totals.cpu))
             cpu_began = family.cpu()
             resumed, waited = clock()
+        if loop is not None:
+            family.meet()
+            totals.cpu += family.cpu() - cpu_began
         totals.steps += steps
         totals.simulated += steps * timestep
         columns = map(np.array, zip(*samples, strict=True))

@@ -3,6 +3,7 @@ texts of exceptions, made fit to travel and to be kept, whatever they hold."""
 
 from __future__ import annotations
 
+import socket
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,25 @@ def unpack(value: Any) -> Any:
     if isinstance(value, list):
         return [unpack(item) for item in value]
     return value
+
+
+def frame(data: bytes) -> bytes:
+    """Bytes as they go through a socket, their number first."""
+    return len(data).to_bytes(4, "big") + data
+
+
+def framed(connection: socket.socket) -> bytes | None:
+    """The next bytes that came through a socket; None: there are none.
+
+    A time-out holds until the first of them has come.
+    """
+    head = connection.recv(4, socket.MSG_WAITALL)
+    length = int.from_bytes(head, "big") if len(head) == 4 else 0
+    parts = []
+    while length and (part := connection.recv(length, socket.MSG_WAITALL)):
+        parts.append(part)
+        length -= len(part)
+    return b"".join(parts) or None
 
 
 def readable(text: str, longest: int = LONGEST) -> str:

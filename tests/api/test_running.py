@@ -19,6 +19,7 @@ from pytest_simbench.cli.main import main
 from pytest_simbench.client.errors import Unavailable, WorkerExited
 from pytest_simbench.motion.registry import find
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks import Stacking
 from tests.api.scripted import FAULTS, Scripted
 from tests.conftest import workers
@@ -106,6 +107,12 @@ def test_what_ends_the_run_early_keeps_the_records(
     del scripted["pybullet"]
     again = simbench.run(Falling(), TWO, reps=4, folder="out", resume=True)
     assert sum(record.ok for record in again.contents.records) == 8 - (fault is ZeroDivisionError)
+
+
+def test_a_policy_that_cannot_be_asked_is_one_sentence(scripted: dict[str, Any]) -> None:
+    scripted["mujoco"] = LoopError
+    with pytest.raises(simbench.BadInput, match=r"^no such luck$"):
+        simbench.run(Falling(), TWO, reps=2)
 
 
 def test_a_run_is_gone_on_with(scripted: dict[str, Any]) -> None:

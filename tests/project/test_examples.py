@@ -27,6 +27,7 @@ def block(page: str, language: str, number: int = 0) -> str:
             ("*2/2 cubes landed*", "simulator * landed % *", "mujoco * 0 of 5 * 100 [[]*"),
         ),
         ("extending/arm.md", ("*1/1 cubes pushed*",)),
+        ("policies.md", ("*1/1 goals reached*", "*test_reach: success >= 80 %*")),
     ],
 )
 def test_tasks(pytester: pytest.Pytester, page: str, shown: tuple[str, ...]) -> None:
@@ -34,6 +35,14 @@ def test_tasks(pytester: pytest.Pytester, page: str, shown: tuple[str, ...]) -> 
     result = pytester.runpytest_subprocess("test_mine.py", "--sim=mujoco", "--reps=5")
     result.assert_outcomes(passed=1)
     result.stdout.fnmatch_lines(shown)
+
+
+def test_a_rate_that_fits_no_step_is_told_in_a_sentence(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_mine=block("policies.md", "python").replace("10.0  # Hz", "30.0"))
+    result = pytester.runpytest_subprocess("test_mine.py", "--sim=mujoco", "--reps=5")
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines("a policy at 30 Hz is asked every 33.33 ms, which is no multiple*")
+    result.stdout.no_fnmatch_line("*closed_loop.py*")
 
 
 def commands(program: str) -> list[tuple[str, str]]:

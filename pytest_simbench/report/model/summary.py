@@ -29,7 +29,7 @@ from pytest_simbench.report.model.pooling import (
     spread,
 )
 
-PHASES = ("launch", "compile", "load", "plan", "step", "other")
+PHASES = ("launch", "compile", "load", "plan", "policy", "step", "other")
 """Where the wall time of a repetition goes, in order."""
 
 SHOWN_COSTS = ("cpu", "ram", "rtf", "cpu_cost", "start", "end")

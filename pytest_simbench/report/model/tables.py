@@ -143,7 +143,7 @@ def time_spent(summary: TaskSummary) -> list[Column]:
 
     columns = [labels(rows)]
     for phase in PHASES:
-        if phase != "compile" or any(row.seconds.get(phase) for row in rows):
+        if phase not in ("compile", "policy") or any(row.seconds.get(phase) for row in rows):
             columns.append(Column(f"{phase} s", [spent(row, phase) for row in rows], "time"))
     totals = [cells.number(row.seconds["total"], 3) for row in rows]
     return [*columns, Column("total s", totals, "time")]

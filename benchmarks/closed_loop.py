@@ -1,0 +1,64 @@
+"""What a policy's questions cost beside the steps between them, in the scene of the stacking.
+
+    python benchmarks/closed_loop.py [SIMULATOR...] [--seconds 10] [--pairs 3]
+
+Bounds, MuJoCo: at 50 Hz at most 15 % of the CPU time of stepping alone, worker and this process
+together; at 500 Hz inside the worker, faster than real time. Rates are the nearest that are whole
+steps. Waiting and asking are measured in turn, in one worker.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+from common import ROOT, arguments, case, present, spread
+
+from pytest_simbench.client.errors import Where
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.world import World
+from pytest_simbench.motion.servo import Servo
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.tasks import Jitter, Stacking
+
+sys.path.insert(0, str(ROOT / "tests" / "client"))
+from waving import Waving, still
+
+
+def costs(name: str, seconds: float, pairs: int) -> None:
+    launch = case(name, Path(os.devnull), stall_timeout=600.0).launch("loop")
+    process = WorkerProcess(launch, Where(name, "headless", seed=1))
+    process.construct()
+    world = World(process, Stacking().scene(1, Jitter()), kinematics=Servo)
+    step = adapter(name).profiles["tuned"].timestep
+    slow, fast = (1 / (round(1 / (rate * step)) * step) for rate in (50.0, 500.0))
+    both = [psutil.Process(process.pid), psutil.Process()]
+
+    def cpu(act: Callable[[], object]) -> float:
+        before = sum(sum(one.cpu_times()[:2]) for one in both)
+        act()
+        return sum(sum(one.cpu_times()[:2]) for one in both) - before
+
+    world.control(still, until=1.0, rate=slow)
+    shares, factors = [], []
+    for _ in range(pairs):
+        alone = cpu(lambda: world.wait(seconds))
+        asked = cpu(lambda: world.control(still, until=seconds, rate=slow))
+        shares.append(100 * (asked / alone - 1))
+        began = time.perf_counter()
+        world.control(Waving(0.1), until=seconds, rate=fast, inside=True)
+        factors.append(seconds / (time.perf_counter() - began))
+    process.close()
+    ms = f"{1000 * alone / seconds / slow:.2f} ms of steps between two questions"
+    print(f"{name}: asked at {slow:.3g} Hz, % of CPU more: {spread(shares, '.0f')}; {ms}")
+    print(f"{name}: inside at {fast:.3g} Hz, times real time: {spread(factors, '.1f')}", flush=True)
+
+
+if __name__ == "__main__":
+    given = arguments(__doc__, {"simulators": []}, seconds=10.0, pairs=3)
+    for simulator in given.simulators or present():
+        costs(simulator, given.seconds, given.pairs)

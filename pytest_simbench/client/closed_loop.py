@@ -1,0 +1,223 @@
+"""A closed loop with a world, from this side: observations come, commands go."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.client.errors import PolicyFailed, WorkerError
+from pytest_simbench.client.policies import Watched, shipped
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.ground.errors import PolicyError
+from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.scene.policy import Kinematics, LoopError, Observation, Rhythm, checked
+from pytest_simbench.scene.set_points import SetPoints, Sight
+
+
+@dataclass(frozen=True)
+class Looking:
+    """What a policy is shown beside the state.
+
+    Attributes:
+        forces: contact forces.
+        picture: width and height of a picture [pixels]; None: none.
+    """
+
+    forces: bool = False
+    picture: tuple[int, int] | None = None
+
+
+class ClosedLoop:
+    """One loop under way: look, answer, look again, until it is over.
+
+    Args:
+        process: with a loaded scene.
+        scene: that scene.
+        rhythm: of the policy.
+        timestep: of the simulator [s].
+        seconds: of simulated time at most.
+        kinematics: of the robot.
+        looking: what is shown.
+        goal: of the task.
+
+    Attributes:
+        observation: the newest that the policy may see.
+        now: what the simulator's state is; newer where a delay was asked for.
+        answer: of the worker, once the loop is over.
+
+    Raises:
+        LoopError: no robot, or a rate, latency or delay that fits no time step.
+    """
+
+    def __init__(
+        self,
+        process: WorkerProcess,
+        scene: Scene,
+        rhythm: Rhythm,
+        *,
+        timestep: float,
+        seconds: float,
+        kinematics: Kinematics,
+        looking: Looking | None = None,
+        goal: Pose | None = None,
+    ) -> None:
+        every, late, self._old = rhythm.steps(timestep)
+        self._sight = Sight(scene, kinematics, goal)
+        looking = self._looking = looking or Looking()
+        self.answer: Mapping[str, Any] | None = None
+        self._seen: list[Observation] = []
+        self._questions = process.converse(
+            "close_loop", every=every, most=max(1, round(seconds * rhythm.rate)), late=late,
+            log_period=None, forces=looking.forces, picture=looking.picture, inside=None,
+        )  # fmt: skip
+        first = next(self._questions)
+        self._see(first)
+        told = self._sight.told(np.frombuffer(first, count=self._sight.numbers))
+        assert scene.robot is not None  # `Sight` has looked
+        self._points = SetPoints(scene.robot, told[0], told[2], 1 / rhythm.rate, kinematics)
+
+    def _see(self, question: bytes) -> None:
+        """Numbers of the state, then a picture, then forces, of what was asked for."""
+        end = 8 * self._sight.numbers
+        state = np.frombuffer(question, count=self._sight.numbers)
+        more: dict[str, Any] = {}
+        if self._looking.picture is not None:
+            width, height = self._looking.picture
+            begin, end = end, end + 3 * width * height
+            more["picture"] = np.frombuffer(question[begin:end], np.uint8).reshape(height, width, 3)
+        if self._looking.forces:
+            more["forces"] = {}
+            for first, second, numbers in json.loads(question[end:]):
+                wrench = np.array(numbers)
+                more["forces"] |= {(first, second): wrench, (second, first): -wrench}
+        self._show(self._sight.read(state, **more))
+
+    def _show(self, now: Observation) -> None:
+        self.now = now
+        self._seen = [*self._seen, self.now][-1 - self._old :]
+        self.observation = self._seen[0]
+
+    def reply(self, answer: Any) -> bool:
+        """Send a policy's answer, and step until it is asked again; False: time is over.
+
+        Raises:
+            PolicyError: it is no command of this robot.
+            WorkerError: as `WorkerProcess.request`.
+        """
+        self._points.after(answer)
+        return self._send(np.concatenate([self._points.position, self._points.effort]).tobytes())
+
+    def end(self) -> None:
+        """No more answers."""
+        if self.answer is None:
+            self._send(None)
+
+    def _send(self, reply: bytes | None) -> bool:
+        try:
+            self._see(self._questions.send(reply))
+        except StopIteration as over:
+            self.answer = over.value
+            at = self._points.position, np.zeros_like(self._points.position), self._points.effort
+            time, joints, bodies = (over.value[name] for name in ("time", "joints", "bodies"))
+            self._show(self._sight.seen(time, joints, at, bodies))
+            return False
+        return True
+
+    def close(self) -> None:
+        """End it, whatever state it is in."""
+        with contextlib.suppress(WorkerError):  # what ended it is told already
+            self._questions.close()
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A policy and how it is to be asked.
+
+    Attributes:
+        policy: whatever has `act`.
+        rhythm: how often, and how late.
+        until: simulated seconds, or what ends the loop once it holds of an observation.
+        at_most: seconds that the loop lasts if that never holds.
+        seed: of the episode.
+        looking: what the policy is shown beside the state.
+        inside: whether it runs in the worker.
+        goal: of the task.
+    """
+
+    policy: Any
+    rhythm: Rhythm
+    until: float | Callable[[Observation], bool]
+    at_most: float
+    seed: int
+    looking: Looking
+    inside: bool
+    goal: Pose | None
+
+    @property
+    def seconds(self) -> float:
+        """That it lasts at most.
+
+        Raises:
+            LoopError: no number above 0.
+        """
+        seconds = self.at_most if callable(self.until) else self.until
+        return checked(seconds, "the seconds of a closed loop", above=True)
+
+    def inner(
+        self, process: WorkerProcess, scene: Scene, timestep: float, log_period: float | None
+    ) -> Mapping[str, Any]:
+        """Carry it out inside the worker; its answer."""
+        Sight(scene)  # there is a robot
+        every, late, old = self.rhythm.steps(timestep)
+        asked = {"until=a function": callable(self.until), "observation_delay": old}
+        if refused := [name for name, value in {**asked, **vars(self.looking)}.items() if value]:
+            raise LoopError(f"a policy inside the worker takes no {refused[0]}")
+        most = max(1, round(self.seconds * self.rhythm.rate))
+        answer: Mapping[str, Any] = process.request(
+            "close_loop", every=every, most=most, late=late, log_period=log_period,
+            forces=False, picture=None, inside=shipped(self.policy, self.seed, self.goal),
+        )  # fmt: skip
+        return answer
+
+    def outer(
+        self, process: WorkerProcess, scene: Scene, timestep: float, kinematics: Kinematics
+    ) -> tuple[Mapping[str, Any], list[Observation], float]:
+        """Carry it out in this process.
+
+        Returns:
+            The worker's answer, the states at each observation, and the seconds that the policy
+            took.
+        """
+        watched = Watched(process, getattr(self.policy, "name", type(self.policy).__name__))
+        states: list[Observation] = []
+        loop: ClosedLoop | None = None
+
+        def work() -> None:
+            nonlocal loop
+            reset = getattr(self.policy, "reset", None)
+            if reset is not None:
+                watched.ask(reset, self.seed)
+            loop = ClosedLoop(
+                process, scene, self.rhythm, timestep=timestep, seconds=self.seconds,
+                kinematics=kinematics, looking=self.looking, goal=self.goal,
+            )  # fmt: skip
+            try:
+                going = True
+                while going and not (callable(self.until) and self.until(loop.observation)):
+                    going = loop.reply(watched.ask(self.policy.act, loop.observation))
+                    states.append(loop.now)
+                loop.end()
+            except PolicyError as error:
+                raise PolicyFailed(str(error), process.where) from error
+            finally:
+                loop.close()
+
+        watched.run(work)
+        assert loop is not None  # nothing was raised
+        assert loop.answer is not None
+        return loop.answer, states, watched.seconds

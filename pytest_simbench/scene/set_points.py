@@ -1,0 +1,204 @@
+"""What becomes of a policy's answers, set points of all joints, and of what a worker sends it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pytest_simbench.ground.errors import PolicyError
+from pytest_simbench.scene.policy import Command, Kinematics, LoopError, Observation
+from pytest_simbench.scene.pose import FloatArray, Pose
+from pytest_simbench.scene.robot import FREE, Robot
+from pytest_simbench.scene.scene import Scene
+
+WAYS = ("position", "velocity", "tool", "tool_change")
+"""In which a command can say where the arm goes."""
+
+
+class SetPoints:
+    """Of all joints: those that a policy's answers lead to, one period after the other.
+
+    Args:
+        robot: that is commanded.
+        position: set points at the start, (n_joints,).
+        effort: fed forward at the start, (n_joints,), where there is no model to tell it.
+        period: of the policy [s].
+        kinematics: its model; None: commands of the tool are refused, and the efforts stay.
+
+    Attributes:
+        position, effort: the present ones.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        position: FloatArray,
+        effort: FloatArray,
+        period: float,
+        kinematics: Kinematics | None = None,
+    ) -> None:
+        self.position, self.effort = np.array(position, dtype=float), np.array(effort, dtype=float)
+        self._robot, self._period, self._kinematics = robot, period, kinematics
+        self._fingers = np.array(robot.finger_indices, dtype=int)
+        self._arm = np.setdiff1d(np.arange(len(robot.joints)), self._fingers)
+        self._driven = robot.column("stiffness") > FREE
+        if kinematics is not None:
+            self.effort = kinematics.holding_effort(self.position)
+
+    def after(self, answer: Any) -> None:
+        """Go on by one answer.
+
+        Raises:
+            PolicyError: it is no command of this robot.
+        """
+        if answer is None:
+            return
+        command = Command.of(answer)
+        ways = [way for way in WAYS if getattr(command, way) is not None]
+        if len(ways) > 1:
+            raise PolicyError(f"the policy commands {' and '.join(ways)} at once; choose one")
+        position = self.position.copy()
+        if command.position is not None:
+            self._put(position, command.position, "position")
+        elif command.velocity is not None:
+            speeds = np.zeros_like(position)
+            self._put(speeds, command.velocity, "velocity")
+            position += self._period * speeds
+        elif ways:
+            position = self._towards(self._tool(command))
+        if command.gripper is not None:
+            position[self._fingers] = self._finger(command.gripper)
+        self.position = position
+        if command.effort is not None:
+            effort = np.zeros_like(position)
+            moved = self._put(effort, command.effort, "effort")
+            if not ways and self._driven[moved].any():
+                raise PolicyError(
+                    "the policy commands efforts alone, and the joints have drives that hold their "
+                    "positions; give the task a robot of motors (robot.as_motors())"
+                )
+            self.effort = effort
+        elif self._kinematics is not None:
+            self.effort = self._kinematics.holding_effort(position)
+
+    def _put(self, row: FloatArray, values: ArrayLike, what: str) -> NDArray[np.intp]:
+        """Write values of the arm's joints, or of all, into a row of all; which these are."""
+        found = _numbers(values, what)
+        everything = np.arange(len(row))
+        for joints in (self._arm, everything):
+            if found.shape == joints.shape:
+                row[joints] = found
+                return joints
+        raise PolicyError(
+            f"the policy answers {what} of shape {found.shape}; the arm has {len(self._arm)} "
+            f"joints, and {len(row)} with its fingers"
+        )
+
+    def _tool(self, command: Command) -> Pose:
+        if command.tool is not None:
+            if not isinstance(command.tool, Pose):
+                raise PolicyError(f"the policy answers tool={command.tool!r:.60}, which is no Pose")
+            return command.tool
+        change = _numbers(command.tool_change, "tool_change")
+        if change.shape != (6,):
+            raise PolicyError(f"the policy answers a tool_change of shape {change.shape}, not (6,)")
+        if self._kinematics is None:
+            raise PolicyError("inside the worker a policy commands joints, not the tool")
+        tool, angle = self._kinematics.tool_pose(self.position), float(np.linalg.norm(change[3:]))
+        i, j, k = (float(part) for part in np.sinc(angle / 2 / np.pi) / 2 * change[3:])
+        turned = Pose(quaternion=(math.cos(angle / 2), i, j, k)) * Pose(quaternion=tool.quaternion)
+        x, y, z = (float(part) for part in np.add(tool.position, change[:3]))
+        return Pose((x, y, z), turned.quaternion)
+
+    def _towards(self, tool: Pose) -> FloatArray:
+        if self._kinematics is None:
+            raise PolicyError("inside the worker a policy commands joints, not the tool")
+        return self._kinematics.towards(self.position, tool, self._period)
+
+    def _finger(self, width: float) -> float:
+        value = float(_numbers(width, "gripper").reshape(()))
+        if not len(self._fingers):
+            raise PolicyError(f"the policy moves the gripper; robot {self._robot.name!r} has none")
+        low, high = sorted((self._robot.gripper.closed, self._robot.gripper.opened))
+        wanted = value / 2 if self._kinematics is None else self._kinematics.finger(value)
+        return float(np.clip(wanted, low, high))
+
+
+def _numbers(values: Any, what: str) -> FloatArray:
+    try:
+        found = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise PolicyError(f"the policy answers {what}={values!r:.60}, which is no number") from None
+    if not np.isfinite(found).all():
+        raise PolicyError(f"the policy answers {what} with a number that is not finite: {found}")
+    return found
+
+
+class Sight:
+    """Makes observations of what a worker sends.
+
+    Args:
+        scene: that is loaded; it has a robot.
+        kinematics: of the robot; None inside the worker.
+        goal: of the task.
+    """
+
+    def __init__(
+        self, scene: Scene, kinematics: Kinematics | None = None, goal: Pose | None = None
+    ) -> None:
+        robot = scene.robot
+        if robot is None:
+            raise LoopError(f"scene {scene.name!r} has no robot that a policy could move")
+        self.joints, self._kinematics, self._goal = len(robot.joints), kinematics, goal
+        self._names = tuple(body.name for body in scene.free_bodies)
+        columns = ("stiffness", "damping", "effort_limit")
+        self._drives = np.array([robot.column(name) for name in columns])
+
+    def seen(
+        self,
+        time: float,
+        joints: FloatArray,
+        told: Sequence[FloatArray] | FloatArray,
+        bodies: FloatArray,
+        **more: Any,
+    ) -> Observation:
+        """One observation.
+
+        Args:
+            time: simulated [s].
+            joints: positions and velocities, (2, n_joints).
+            told: the set points in force: position, velocity, effort, (n_joints,) each.
+            bodies: rows of the free bodies, (n_free, 13).
+            more: forces and picture.
+        """
+        return Observation(
+            time, joints[0], joints[1], np.asarray(told), bodies, self._names,
+            goal=self._goal, drives=self._drives, kinematics=self._kinematics, **more,
+        )  # fmt: skip
+
+    def read(self, state: FloatArray, **more: Any) -> Observation:
+        """One observation, of `written` numbers."""
+        n = self.joints
+        joints, bodies = state[1 : 1 + 2 * n].reshape(2, n), state[1 + 5 * n :].reshape(-1, 13)
+        return self.seen(float(state[0]), joints, self.told(state), bodies, **more)
+
+    def told(self, state: FloatArray) -> FloatArray:
+        """The set points in force among `written` numbers, (3, n_joints)."""
+        n = self.joints
+        return state[1 + 2 * n : 1 + 5 * n].reshape(3, n)
+
+    @property
+    def numbers(self) -> int:
+        """How many `written` ones there are."""
+        return 1 + 5 * self.joints + 13 * len(self._names)
+
+
+def written(
+    time: float, joints: FloatArray, told: Sequence[FloatArray], bodies: FloatArray
+) -> FloatArray:
+    """What `Sight.read` reads, as one row of numbers."""
+    return np.concatenate([[time], joints.ravel(), *told, bodies.ravel()])

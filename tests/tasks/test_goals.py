@@ -1,0 +1,117 @@
+"""The tasks of a policy: goals, what counts as reached, and the episode on a real engine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.motion.kinematics import DOWNWARD
+from pytest_simbench.motion.registry import known_robot
+from pytest_simbench.records.record import Record
+from pytest_simbench.scene import Pose
+from pytest_simbench.scene.policy import Command, Observation
+from pytest_simbench.tasks import GoalTask, Jitter, PickAndPlace, PushingToGoal, Reaching
+from pytest_simbench.tasks.goals import digest
+
+TASKS = (Reaching, PushingToGoal, PickAndPlace)
+
+
+def limp(seen: Observation) -> None:
+    """Does nothing."""
+
+
+def to_the_goal(seen: Observation) -> Command:
+    """Straight there, the tool pointing down."""
+    assert seen.goal is not None
+    return Command(tool=Pose(seen.goal.position, DOWNWARD.quaternion))
+
+
+@given(st.integers(0, 10**6))
+def test_each_seed_has_its_goal_within_the_arms_reach(seed: int) -> None:
+    for kind in TASKS:
+        task = kind(limp)
+        goal = task.goal(seed)
+        assert goal == task.goal(seed) != task.goal(seed + 1)
+        x, y, z = goal.position
+        assert 0.2 < np.hypot(x, y) < 0.75
+        assert 0.0 < z <= 0.5
+
+
+@given(st.integers(0, 10**6))
+def test_the_way_of_a_push_is_as_long_as_it_says(seed: int) -> None:
+    task = PushingToGoal(limp)
+    way = np.subtract(task.goal(seed).position, task.begin(seed).position)
+    assert 0.08 <= np.linalg.norm(way) <= 0.15
+    assert way[2] == 0.0
+    assert abs(np.arctan2(way[1], way[0])) <= 2.1
+
+
+@given(st.integers(0, 10**6))
+def test_what_is_to_be_placed_stands_apart_from_its_place(seed: int) -> None:
+    cube, stand = PickAndPlace(limp).scene(seed, Jitter()).bodies
+    assert np.linalg.norm(np.subtract(cube.pose.position, stand.pose.position)[:2]) > 0.1
+    assert PickAndPlace(limp).goal(seed).position[2] == pytest.approx(0.075)
+
+
+def test_a_small_arm_has_a_small_scene() -> None:
+    small = PushingToGoal(limp, robot=known_robot("so101"))
+    assert small.scale < 0.6
+    way = np.subtract(small.goal(1).position, small.begin(1).position)
+    assert np.linalg.norm(way) < 0.15 * 0.6
+
+
+def test_a_record_tells_which_policy_it_was() -> None:
+    found = Reaching(limp, command_latency=0.1).parameters()
+    assert (found["task.policy"], found["task.command_latency"]) == ("limp", 0.1)
+    assert found["task.policy_digest"] == digest(limp) != digest(to_the_goal)
+    assert "task.robot" not in found
+
+    class Held:
+        gain = 1.0
+
+        def __init__(self, gain: float) -> None:
+            self.gain = gain
+
+    assert digest(Held(1.0)) == digest(Held(1.0)) != digest(Held(2.0))
+
+
+def run(case: Case, task: GoalTask, **changes: Any) -> Record:
+    record, error = Repetition(Experiment(replace(case, **changes), task), 1).run()
+    assert error is None
+    return record
+
+
+@pytest.mark.engine
+def test_who_gets_there_succeeds_and_is_done_early(case: Case) -> None:
+    record = run(case, Reaching(to_the_goal, rate=10.0))
+    assert record.metrics["success"] == 1.0
+    assert record.metrics["distance"] < 1e-3
+    assert 0.1 <= record.metrics["time"] <= 1.0
+    assert record.details["acted"] == pytest.approx(record.metrics["time"] + 0.5)
+    assert record.seconds["policy"] > 0
+    assert not record.reasons
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize("kind", TASKS)
+def test_who_does_nothing_fails(case: Case, kind: type[GoalTask]) -> None:
+    record = run(case, kind(limp, seconds=1.0))
+    assert (record.metrics["success"], record.metrics["time"]) == (0.0, None)
+    assert record.metrics["distance"] > 0.05
+    assert record.details["acted"] == pytest.approx(1.0)
+    assert record.reasons == (f"{kind.moved or 'tool'} not at its goal",)
+
+
+@pytest.mark.engine
+def test_the_motion_is_kept_for_the_replay(case: Case) -> None:
+    run(case, Reaching(limp, seconds=1.0), trace="on")
+    (trace,) = (case.folder / "traces").glob("*.npz")
+    assert np.load(trace)["time"].size >= 75
