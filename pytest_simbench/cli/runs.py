@@ -201,10 +201,14 @@ def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, 
         yield "history", for_terminal("\n".join(history_lines(written.histories, width)))
 
 
+def text_of(report: Report, width: int, verbose: bool) -> str:
+    """The same as one text, without the first title."""
+    (_, first), *others = [*sections(report, width, verbose)] or [("", "")]
+    return "\n".join([first, *(f"\n{title}\n{text}" for title, text in others)])
+
+
 def _print(written: Written, verbose: bool, problems: Iterable[str]) -> None:
-    width = shutil.get_terminal_size().columns
-    for number, (title, text) in enumerate(sections(written, width, verbose)):
-        print(f"\n{title}\n{text}" if number else text)
+    print(text_of(written, shutil.get_terminal_size().columns, verbose))
     for problem in filter(None, problems):
         print(for_terminal(problem))
 
@@ -232,18 +236,22 @@ def recordings(
 ) -> list[str]:
     """Write the motions of a run, whose folder holds the traces, as rosbag2 folders into another
     one; lines for the terminal. Without a live line there is one on standard output."""
-    count, problems = write_bags(run, target, records, progress or _printed())
+    count, problems = write_bags(run, target, records, progress or printed())
     if not count:
         return [*problems, "no recordings: the run has no traces; see --sim-trace"]
     many = f"{count} recording{'s' if count > 1 else ''}"
     return [*problems, f"{many}: {shown(target / FOLDER, Path.cwd())}"]
 
 
-def _printed() -> Progress:
-    def write(text: str) -> None:
-        print(text, end="", flush=True)
+def printed(quiet: bool = False) -> Progress:
+    """The live line on standard output; a notebook rewrites it as a terminal does."""
 
-    return Progress(write, sys.stdout.isatty(), shutil.get_terminal_size().columns)
+    def write(text: str) -> None:
+        if not quiet:
+            print(text, end="", flush=True)
+
+    live = sys.stdout.isatty() or type(sys.stdout).__module__.startswith("ipykernel")
+    return Progress(write, live, shutil.get_terminal_size().columns)
 
 
 def _target(output: str | None, folders: list[RunFolder]) -> Path | None:

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
+from pytest_simbench.ground.text import for_terminal
+
 LONGEST_WORD = 100
 """Characters in a name; more is a mistake, and would fill the terminal with its own complaint."""
 
@@ -27,12 +29,19 @@ AUTO_LIMIT = 160
 MOST_REPETITIONS = 100_000
 """At a second each they take more than a day; a larger number is a slip of the hand."""
 
+LARGEST_SEED = 2**53 - MOST_REPETITIONS - 1
+"""The seed of every repetition is then a whole number that any reader of JSON keeps."""
+
 LONGEST = 1e6
 """Of all time-outs [s]: eleven days."""
 
 
 class BadInput(Exception):
     """Something that a user asks for cannot be; the message is one sentence."""
+
+    def _render_traceback_(self) -> list[str]:
+        """What IPython shows: the sentence alone."""
+        return [for_terminal(str(self)), *getattr(self, "__notes__", ())]
 
 
 class BadValue(BadInput, argparse.ArgumentTypeError):
@@ -125,6 +134,8 @@ ANY_NUMBER = Number(-1e300, 1e300)
 REPETITIONS = Number(1, MOST_REPETITIONS, whole=True)
 SECONDS = Number(0.001, LONGEST)
 SHARE = Number(0, 1)
+SEED = Number(0, LARGEST_SEED, whole=True)
+JITTER = Number(0, 1000)
 _JOBS = Number(1, 256, whole=True)
 
 

@@ -14,6 +14,7 @@ from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.repetition import AnyRepetition, Ended, Hooks
+from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import short
@@ -39,14 +40,30 @@ class Repeater:
         executor: where and how many side by side.
         progress: the live line.
         keep: takes every record at once, before anything else can go wrong.
+        begin: is called before the first progress.
+        resumed: the interrupted run that is completed, if one is.
     """
 
     experiment: Experiment
     executor: Executor
     progress: ProgressLine
     keep: Callable[[Record], None]
+    begin: Callable[[], None] = lambda: None
+    resumed: Resumed | None = None
     _active: set[AnyRepetition] = field(default_factory=set, init=False)
     _stopping: threading.Event = field(default_factory=threading.Event, init=False)
+
+    def up_to(self, number: int, found: dict[int, Record]) -> list[Record]:
+        """Records of all repetitions from 1 to `number`, and of what a resumed run has beyond;
+        `found` holds those so far, by repetition, and takes the new ones. Raises as `run`, and
+        `NotResumed` where the versions are not those of the run."""
+        missing = [k for k in range(1, number + 1) if k not in found]
+        if missing:
+            if self.resumed is not None:
+                self.resumed.check_versions(self.experiment, self.executor)
+            self.begin()
+            found |= {r.repetition: r for r in self.run(missing).records}
+        return [found[k] for k in sorted(found)]
 
     def run(self, numbers: Iterable[int]) -> ResultSet:
         """Run the repetitions of these numbers.

@@ -32,7 +32,8 @@ from pytest_simbench.measure.comparison import (
 from pytest_simbench.measure.limits import CRASHED, Limit
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import POWER, without_speed
-from pytest_simbench.records.configuration import differences
+from pytest_simbench.records.configuration import differences, other_meanings
+from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import RowKey, by_test, grouped
@@ -190,6 +191,16 @@ def run_gate(
         tuple(filter(None, broken)),
         tuple(sorted(notes)),
     )
+
+
+def gate_runs(
+    baseline: RunContents, run: RunContents, limits: Sequence[Limit] = (), *, typed: bool = True
+) -> GateReport:
+    """The same of two runs, which say what their metrics mean; see `run_gate`."""
+    metrics = {**baseline.metrics, **run.metrics}
+    report = run_gate(baseline.records, run.records, limits, metrics, typed=typed)
+    other = other_meanings(baseline.tasks, run.tasks)
+    return replace(report, differences=(*other, *report.differences))
 
 
 def side_by_side(

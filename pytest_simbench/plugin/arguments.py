@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import pytest
 
-from pytest_simbench.cli.values import ANY_NUMBER, BadValue, refusing, shown
+from pytest_simbench.cli.values import ANY_NUMBER, BadInput, BadValue, refusing, shown
 
 if TYPE_CHECKING:
     from pytest_simbench.experiment.experiment import Experiment
@@ -28,14 +28,10 @@ def _refuse(sentence: str) -> NoReturn:
 
 def checked_task(value: Any, fixture: str) -> Task:
     """`value` if it is a task; else the test fails. `fixture` is the one that it was given."""
-    from pytest_simbench.tasks.base import Task
+    from pytest_simbench.cli import selection
 
-    if isinstance(value, Task):
-        return value
-    if isinstance(value, type) and issubclass(value, Task):
-        name = value.__name__
-        _refuse(f"{fixture}({name}) got a class instead of a task: write {fixture}({name}())")
-    _refuse(f"{fixture}({shown(repr(value))}) takes a task, for instance {fixture}(Throwing())")
+    with failing(BadInput):
+        return selection.checked_task(value, fixture)
 
 
 def can_do(experiment: Experiment, skips: bool) -> Experiment:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from pytest_simbench.client.display import Displays
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.experiment import Experiment
+    from pytest_simbench.experiment.variants import Variant
     from pytest_simbench.plugin.run import Run
-    from pytest_simbench.plugin.variants import Variant
 
 OF_CASES = ("fresh", "stall_timeout", "memory_limit", "seed", "jitter")
 """Options of the same name as an attribute of `Case`, behind `sim_`."""
@@ -37,9 +37,8 @@ def case_of(
         item: the test; None for the handle that all tests share.
         settings: that the test changes, unchecked.
     """
-    from pytest_simbench.experiment.case import PROTOCOLS, Case
-    from pytest_simbench.plugin.marks import number_mark
-    from pytest_simbench.plugin.variants import named
+    from pytest_simbench.experiment.case import PROTOCOLS
+    from pytest_simbench.plugin.marks import named, number_mark
 
     name, mode = made_for.simulator, made_for.mode
     session = session_of(config)
@@ -52,16 +51,10 @@ def case_of(
         of_test = {"test": item.nodeid, "function": function, "variant": others}
         timeout = timeout if timeout is not None else number_mark(item, "sim_timeout")
         own = arguments.checked_settings(settings, name, made_for.profile)
-    return Case.of(
-        name,
-        python=chosen.pythons.get(name),
-        mode=mode,
-        profile=made_for.profile,
-        own_timestep=made_for.own_timestep,
+    return chosen.case(
+        made_for,
+        own,
         folder=this.use(),
-        changes={**own, **chosen.changes_of(name), **made_for.changes},
-        spec=chosen.specs.get(name),
-        robot=chosen.robots[made_for.robot],
         display=_display(this) if mode == "gui" and not elsewhere else None,
         protocol=PROTOCOLS[options.value(config, "sim_protocol")],
         trace=recording.trace_mode(config),
@@ -115,8 +108,8 @@ def expected(session: pytest.Session) -> list[Experiment]:
 def _of(item: pytest.Item) -> Iterator[Experiment]:
     """The experiment of a test of one repetition, if it tells and runs without a window."""
     from pytest_simbench.experiment.experiment import Experiment
+    from pytest_simbench.experiment.variants import Variant
     from pytest_simbench.plugin.marks import number_mark
-    from pytest_simbench.plugin.variants import Variant
     from pytest_simbench.simulator import SimulatorError
     from pytest_simbench.tasks.base import Task
 

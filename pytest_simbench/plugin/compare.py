@@ -11,7 +11,7 @@ import pytest
 
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.ground.versions import base_name
-from pytest_simbench.measure.gate import GateReport, run_gate, side_by_side
+from pytest_simbench.measure.gate import GateReport, gate_runs, side_by_side
 from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
 from pytest_simbench.plugin import options
 from pytest_simbench.records.baseline import (
@@ -20,7 +20,6 @@ from pytest_simbench.records.baseline import (
     from_benchmarks,
     read_baseline,
 )
-from pytest_simbench.records.configuration import other_meanings
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric, UnknownMetric
 from pytest_simbench.report.markdown.run import render_changes as render_markdown
@@ -49,13 +48,11 @@ class Comparison:
 
     def make(self, run: RunContents) -> None:
         """Compare with this run, which says what the metrics mean."""
-        before, now = self.baseline.records, run.records
+        baseline = self.baseline
         if self.beside is not None:
             before, now = side_by_side(run.records, *self.beside)
-        metrics = {**self.baseline.metrics, **run.metrics}
-        report = run_gate(before, now, self.limits, metrics, typed=self.typed)
-        other = other_meanings(self.baseline.tasks, run.tasks)
-        self._report = replace(report, differences=(*other, *report.differences))
+            baseline, run = replace(baseline, records=before), replace(run, records=now)
+        self._report = gate_runs(baseline, run, self.limits, typed=self.typed)
 
     @property
     def failed(self) -> bool:

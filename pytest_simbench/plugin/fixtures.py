@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from pytest_simbench.client.world import World
     from pytest_simbench.experiment.case import Case
     from pytest_simbench.experiment.handle import SimulatorHandle
+    from pytest_simbench.experiment.variants import Variant
     from pytest_simbench.measure.results import ResultSet
     from pytest_simbench.plugin.repeatability import Perturber
-    from pytest_simbench.plugin.variants import Variant
     from pytest_simbench.repeatability.replay import Replay
     from pytest_simbench.scene import Robot, Scene
     from pytest_simbench.tasks.base import Task

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.cli.selection import Selection
 from pytest_simbench.cli.values import REPETITIONS, SECONDS, SHARE, BadValue, shown
+from pytest_simbench.experiment.variants import Variant
 from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.ground.versions import covers
 from pytest_simbench.plugin import options
-from pytest_simbench.plugin.selection import Selection
-from pytest_simbench.plugin.variants import Variant, named
 from pytest_simbench.simulator import registry
 from pytest_simbench.simulator.info import Capability
 
@@ -110,6 +110,19 @@ def _names(mark: pytest.Mark, node: Any) -> list[str]:
     with options.refusing(registry.UnknownSimulatorError, f"{node.nodeid}: {mark.name}"):
         registry.check_names(map(str, mark.args))
     return list(mark.args)
+
+
+def named(item: pytest.Item, own: str) -> tuple[str, str]:
+    """The id of a test without its parameters; and what the id has of other parameters than ours.
+
+    Args:
+        own: our part of the id, from `Variant.id_with`.
+    """
+    chosen = getattr(item, "callspec", None)
+    if chosen is None:
+        return item.nodeid, ""
+    others = [part for part in chosen._idlist if part != own]
+    return item.nodeid.removesuffix(f"[{chosen.id}]"), "-".join(others)
 
 
 def describe_failure(item: pytest.Item, report: pytest.TestReport, profiles: int) -> dict[str, Any]:

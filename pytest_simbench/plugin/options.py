@@ -14,9 +14,6 @@ from pytest_simbench.cli import values as read
 from pytest_simbench.cli.values import AUTO_LIMIT, MOST_REPETITIONS, BadValue
 from pytest_simbench.records.tuned_on import FIRST_SEED
 
-LARGEST_SEED = 2**53 - MOST_REPETITIONS - 1
-"""The seed of every repetition is then a whole number that any reader of JSON keeps."""
-
 
 @dataclass(frozen=True)
 class Option:
@@ -106,9 +103,9 @@ OPTIONS = (
            f"{AUTO_LIMIT}; auto:LIMIT", None, "N", long="--sim-reps"),
     Option("--protocol", read.choice("fast", "paper", "smoke"), "fast, as fast as possible; paper, "
            "as the study; smoke, smallest", "fast", "NAME", long="--sim-protocol"),
-    Option("--jitter", read.Number(0, 1000), "scale of the start jitter, at most 1000; 1 is 1 mm "
+    Option("--jitter", read.JITTER, "scale of the start jitter, at most 1000; 1 is 1 mm "
            "and 1 degree, 0 is none", 1.0, "SCALE", long="--sim-jitter"),
-    Option("--sim-seed", read.Number(0, LARGEST_SEED, whole=True), "seed of the first repetition; "
+    Option("--sim-seed", read.SEED, "seed of the first repetition; "
            "the next ones follow", FIRST_SEED, "SEED"),
     Option("--sim-timeout", read.SECONDS, "time-out of a repetition in seconds (default: the "
            "study's)", None, "SECONDS"),

@@ -13,6 +13,7 @@ from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repeater import Repeater
+from pytest_simbench.experiment.resumed import NotResumed
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
 from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.measure.results import ResultSet
@@ -22,7 +23,6 @@ from pytest_simbench.plugin import options, recording
 from pytest_simbench.plugin.arguments import can_do, failing
 from pytest_simbench.plugin.benchmark import give_rounds
 from pytest_simbench.plugin.marks import number_mark
-from pytest_simbench.plugin.resume import NotResumed
 from pytest_simbench.plugin.run import Run
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.claims import Claim
@@ -45,7 +45,6 @@ class RepeatFixture:
         self.run = run
         self.results: list[ResultSet] = []
         self.described: dict[str, TaskDescription] = {}
-        self._may_resume = False
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say."""
@@ -58,8 +57,14 @@ class RepeatFixture:
         self.run.describe(experiment.task)
         self.described[experiment.task.name] = TaskDescription.of(experiment.task)
 
+        run = self.run
+        repeater = Repeater(
+            experiment, run.executor, run.progress, run.folder.append, run.begin_lines, run.resumed
+        )
+
         def up_to(number: int) -> list[Record]:
-            return self._up_to(number, experiment, found)
+            with failing((*REFUSALS, LoopError)):
+                return repeater.up_to(number, found)
 
         metrics = experiment.task.metrics
         if isinstance(wanted, Auto):
@@ -74,27 +79,6 @@ class RepeatFixture:
         result.warns = False
         self.results.append(result)
         return result
-
-    def _up_to(self, number: int, experiment: Experiment, found: dict[int, Record]) -> list[Record]:
-        """Records of all repetitions from 1 to `number`, and of what a resumed run has beyond.
-
-        Args:
-            number: of repetitions wanted.
-            experiment: to repeat where one is missing; its case has the attempt.
-            found: the records so far, by repetition; takes the new ones.
-        """
-        missing = [k for k in range(1, number + 1) if k not in found]
-        if missing:
-            if self.run.resumed is not None and not self._may_resume:
-                with failing(REFUSALS):
-                    self.run.resumed.check_versions(experiment, self.run.executor)
-                self._may_resume = True
-            self.run.begin_lines()
-            run = self.run
-            with failing((*REFUSALS, LoopError)):
-                repeater = Repeater(experiment, run.executor, run.progress, run.folder.append)
-                found |= {r.repetition: r for r in repeater.run(missing).records}
-        return [found[k] for k in sorted(found)]
 
     def check_crashes(self) -> None:
         """Fail the test when more repetitions crashed than may: `--sim-crashes`, else the mark of

@@ -20,22 +20,23 @@ from pytest_simbench.client.display import Displays
 from pytest_simbench.cluster.executor import ClusterExecutor
 from pytest_simbench.experiment.executor import Executor, LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.experiment.slots import Slots
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import cluster, options, recording, thresholds
 from pytest_simbench.plugin.compare import Comparison
 from pytest_simbench.plugin.history import folder_of, on_other_machines
-from pytest_simbench.plugin.resume import Resumed, folder_to_resume
+from pytest_simbench.plugin.resume import folder_to_resume
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import Threshold
 from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.repeatability import NAME
 from pytest_simbench.report.files import write_badge, write_outcome, write_report
 from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.markdown.github import append_summary
-from pytest_simbench.report.model.outcome import RunOutcome
+from pytest_simbench.report.model.outcome import RunOutcome, looks_at
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.terminal.progress import Progress
 from pytest_simbench.tasks.base import Task
@@ -70,7 +71,8 @@ class Run:
         self.resumed: Resumed | None = None
         kept = options.value(config, "sim_history") is not None and self.folder.holds_run
         if options.given(config, "sim_resume") or kept:
-            self.resumed = Resumed(self.folder)
+            with options.refusing(RecordError, "--sim-resume"):
+                self.resumed = Resumed(self.folder)
 
     def _choose_path(self) -> Path:
         if self._shared_by is not None and "simbench_folder" in self._shared_by:
@@ -271,7 +273,8 @@ class Run:
         recorded: list[str] = []
         if options.value(self.config, recording.RECORD):
             recorded = runs.recordings(path, path, records, self.progress)
-        found, looks = comparison.found if comparison else None, self._looks()
+        found = comparison.found if comparison else None
+        looks = looks_at(path, self.resumed.records if self.resumed else (), records)
         written = write_report(self.folder, self.reading, found, looks)
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
@@ -296,16 +299,6 @@ class Run:
             problems.insert(0, f"\nwhat could be written is in {path}")
         for line in [*map(for_terminal, filter(None, problems)), *unsaved]:
             reporter.write_line(line)
-
-    def _looks(self) -> int:
-        """How often this run has been judged, with this time: one to which repetitions were added
-        after a verdict was looked at again."""
-        if self.resumed is None:
-            return 1
-        before, _ = RunOutcome.read(self.folder.path)
-        ended = [r for r in self.resumed.records if r.status != "interrupted"]
-        added = len([r for r in self.reading.records if r.status != "interrupted"]) > len(ended)
-        return before.looks + (before.passed is not None and added)
 
     def close(self) -> None:
         """End what the run started."""

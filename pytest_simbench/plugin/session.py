@@ -16,9 +16,9 @@ import pytest
 from pytest_simbench.plugin import cluster, inputs, options, recording
 
 if TYPE_CHECKING:
+    from pytest_simbench.cli.selection import Selection
     from pytest_simbench.plugin.compare import Comparison
     from pytest_simbench.plugin.run import Run
-    from pytest_simbench.plugin.selection import Selection
 
 NAMING = (
     "sim_name",

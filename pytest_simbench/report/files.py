@@ -99,6 +99,14 @@ def write_files(
     return Written(**vars(report), problems=[*told, *failed], complete=not failed)
 
 
+def write_page(path: Path, report: Report, run: Path) -> str:
+    """Write the page alone, of a run in another folder; a sentence when it could not be written."""
+    from pytest_simbench.report.page.context import page
+    from pytest_simbench.report.page.render import render
+
+    return _written(path.parent, path.name, render(page(run, report)))
+
+
 def _draw(
     folder: Path, run: Path, report: Report, told: list[str], failed: list[str]
 ) -> tuple[list[str], dict[str, bytes]]:
@@ -194,31 +202,28 @@ def _unwritable(path: Path, error: OSError) -> str:
     return f"{path} could not be written ({error.strerror or error})"
 
 
-def csv_of(records: Sequence[Record]) -> str:
-    """One line for each repetition; an empty cell where a record has no value; no text is a
-    formula.
+def columns_of(records: Sequence[Record]) -> dict[str, list[Any]]:
+    """A value for each repetition, None where it has none, in each column.
 
     Columns: what identifies it, its error, `metrics.<name>`, `cost.<name>` (see
     `records.metrics.COSTS`) and `seconds.<phase>`.
     """
-    metrics = list(dict.fromkeys(name for record in records for name in record.metrics))
+    metrics = dict.fromkeys(name for record in records for name in record.metrics)
+    errors = ("type", "phase", "message")
+    return {
+        **{name: [getattr(r, name) for r in records] for name in IDENTITY},
+        **{f"error.{name}": [getattr(r.error, name, None) for r in records] for name in errors},
+        **{f"metrics.{name}": [r.metrics.get(name) for r in records] for name in metrics},
+        **{f"cost.{cost.name}": [r.cost(cost.name) for r in records] for cost in COSTS},
+        **{f"seconds.{name}": [r.seconds.get(name) for r in records] for name in PHASES},
+    }
+
+
+def csv_of(records: Sequence[Record]) -> str:
+    """One line for each repetition; an empty cell where a record has no value; no text is a
+    formula."""
+    columns = columns_of(records)
     file = io.StringIO(newline="")
-    rows: list[list[Any]] = [
-        [
-            *IDENTITY,
-            *(f"error.{name}" for name in ("type", "phase", "message")),
-            *(f"metrics.{name}" for name in metrics),
-            *(f"cost.{cost.name}" for cost in COSTS),
-            *(f"seconds.{name}" for name in PHASES),
-        ]
-    ]
-    for record in records:
-        error = record.error
-        cells: list[Any] = [getattr(record, name) for name in IDENTITY]
-        cells += [error.type, error.phase, error.message] if error else ["", "", ""]
-        cells += [record.metrics.get(name) for name in metrics]
-        cells += [record.cost(cost.name) for cost in COSTS]
-        cells += [record.seconds.get(name) for name in PHASES]
-        rows.append(cells)
+    rows = [[*columns], *zip(*columns.values(), strict=True)]
     csv.writer(file).writerows([for_csv(cell) for cell in row] for row in rows)
     return file.getvalue()

@@ -90,7 +90,7 @@ BAD = {
     "--sim-output=link": "link is a link to nothing",
     "--sim-output=/proc/x": "",
     f"--sim-output={'x' * 300}": "longer than any file",
-    "--sim-resume": "there is no run to resume in *.simbench; write --sim-resume=RUN ",
+    "--sim-resume": "there is no run to resume in *.simbench; name the folder of a run",
     "--sim-resume=none": "there is no run to resume in *none (it has no records.jsonl); ",
     "--sim-resume=a --sim-output=b": "--sim-resume a and --sim-output b: ",
     "--sim-resume=bad": "--sim-resume: *bad/records.jsonl:1: not JSON",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pytest_simbench.measure.gate import Change, GateReport
 from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.records.series import short
-from pytest_simbench.report.model.document import Column
+from pytest_simbench.report.model.document import Column, Section, Table
 
 ALWAYS = ("rtf", "cpu_cost", "ram")
 """Costs that are shown although they may not have changed, as the study's metrics are."""
@@ -76,6 +76,18 @@ def _amount(change: Change) -> str:
     rising = change.comparison.second > change.comparison.first
     text = change.limit.describe(change.metric, abs(change.loss))
     return f"{'+' if rising else '-'}{text}" if change.loss else "0"
+
+
+def section(name: str, report: GateReport) -> Section:
+    """The whole comparison with the baseline of that name."""
+    verdicts = failed(report) or [passed(report)]
+    found = columns(report)
+    return Section(
+        f"Compared with {name}",
+        [*verdicts, *warned(report)],
+        [Table("", found)] if found else [],
+        report.notes,
+    )
 
 
 DIFFERENT = "different in the baseline (a change may come from this)"

@@ -6,6 +6,7 @@ The records do not say either: what a test claims is in its code, and the baseli
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from pytest_simbench.ground.files import FileError, read_file, read_json
 from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.records import checked
 from pytest_simbench.records.paths import FolderError, inside, write_whole
+from pytest_simbench.records.record import Record
 
 NAME = "outcome.json"
 
@@ -94,3 +96,10 @@ def _changes(data: Any) -> list[dict[str, Any]]:
     """
     report = data.get("comparison")
     return [] if report is None else [*report["changes"], *report["others"]]
+
+
+def looks_at(folder: Path, before: Iterable[Record], now: Iterable[Record]) -> int:
+    """How often a run has been judged, with this time: one that ended and to which repetitions were
+    added was looked at before."""
+    counts = [sum(r.status != "interrupted" for r in records) for records in (before, now)]
+    return RunOutcome.read(folder)[0].looks + ((folder / NAME).exists() and counts[1] > counts[0])

@@ -67,6 +67,12 @@ def section(summary: TaskSummary, shown: Shown = cells.spread) -> Section:
     return Section(title(summary), sentences(summary), tables, notes(summary), summary.task)
 
 
+def compared(summary: TaskSummary) -> Section:
+    """In what the rows of a task differ."""
+    found = matrix(summary)
+    return replace(section(summary), tables=[Table("", found, MATRIX)] if found else [])
+
+
 def study(summary: TaskSummary, shown: Shown = cells.spread) -> list[Column]:
     """The first table: crashes, the task's own metrics, then costs."""
     rows = summary.rows

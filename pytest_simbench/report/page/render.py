@@ -5,17 +5,18 @@ from __future__ import annotations
 import hashlib
 import re
 from base64 import b64encode
+from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
+from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
 from pytest_simbench import __version__
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.report.model import changes
-from pytest_simbench.report.model.document import Cell, Table, capital
+from pytest_simbench.report.model.document import Cell, Section, Table, capital
 from pytest_simbench.report.page.context import Shown
 
 _LOG = re.compile(r"logs/[A-Za-z0-9_=-][A-Za-z0-9_.=-]*\.log")
@@ -31,22 +32,32 @@ SYMBOLS = {"ahead": ("\u25b2", "ahead"), "behind": ("\u25bc", "behind"),
 def render(page: Shown) -> str:
     """The page as one HTML document, without a line that depends on when it was made."""
     style, script = _part("page.css"), _part("page.js")
-    return _template().render(
-        page=page,
-        style=Markup(style),
-        script=Markup(script),
-        # No other script runs, whatever a text smuggled in; nothing is loaded, styles stay inside.
-        policy=f"default-src 'none'; script-src 'sha256-{_digest(script)}'; "
-        "style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'",
-        symbols=SYMBOLS,
-        capital=capital,
-        rows=_rows,
-        failed=changes.failed,
-        warned=changes.warned,
-        svg=lambda picture: Markup(picture.svg),
-        log_link=lambda log: log if _LOG.fullmatch(log) else "",
-        version=__version__,
+    return (
+        _environment()
+        .get_template("page.html")
+        .render(
+            page=page,
+            style=Markup(style),
+            script=Markup(script),
+            # No other script runs, whatever a text smuggled in; nothing is loaded.
+            policy=f"default-src 'none'; script-src 'sha256-{_digest(script)}'; "
+            "style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'",
+            symbols=SYMBOLS,
+            capital=capital,
+            rows=_rows,
+            failed=changes.failed,
+            warned=changes.warned,
+            svg=lambda picture: Markup(picture.svg),
+            log_link=lambda log: log if _LOG.fullmatch(log) else "",
+            version=__version__,
+        )
     )
+
+
+def fragment(sections: Sequence[Section]) -> str:
+    """Sections as a part of somebody else's page, a notebook's for instance."""
+    template = _environment().get_template("sections.html")
+    return template.render(sections=sections, rows=_rows, symbols=SYMBOLS, capital=capital)
 
 
 def _rows(found: Table) -> list[tuple[Cell, ...]]:
@@ -57,7 +68,7 @@ def _rows(found: Table) -> list[tuple[Cell, ...]]:
 
 
 @cache
-def _template() -> Template:
+def _environment() -> Environment:
     return Environment(
         loader=FunctionLoader(_part),
         autoescape=True,
@@ -65,7 +76,7 @@ def _template() -> Template:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-    ).get_template("page.html")
+    )
 
 
 def _part(name: str) -> str:

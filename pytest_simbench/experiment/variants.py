@@ -8,13 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from pytest_simbench.records.series import step_text
 from pytest_simbench.simulator.settings import LARGEST_TIMESTEP, SHORTEST_TIMESTEP
-
-if TYPE_CHECKING:
-    import pytest
 
 USUAL = "tuned"
 """The settings profile of a run that names none."""
@@ -58,19 +55,6 @@ class Variant(NamedTuple):
         profile = self.profile if profiles > 1 and self.profile != USUAL else ""
         step = "" if self.timestep is None else f"dt={step_text(self.timestep)}"
         return "-".join(filter(None, [self.simulator, self.mode, self.robot, profile, step]))
-
-
-def named(item: pytest.Item, own: str) -> tuple[str, str]:
-    """The id of a test without its parameters; and what the id has of other parameters than ours.
-
-    Args:
-        own: our part of the id, from `Variant.id_with`.
-    """
-    chosen = getattr(item, "callspec", None)
-    if chosen is None:
-        return item.nodeid, ""
-    others = [part for part in chosen._idlist if part != own]
-    return item.nodeid.removesuffix(f"[{chosen.id}]"), "-".join(others)
 
 
 def variants(

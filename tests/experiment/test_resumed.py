@@ -14,9 +14,9 @@ import pytest
 from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import expected
-from pytest_simbench.plugin.resume import NotResumed, Resumed
+from pytest_simbench.experiment.resumed import NotResumed, Resumed
 from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Record, RecordError
 from tests.tiny import Falling
 
 Save = Callable[..., Resumed]
@@ -65,7 +65,7 @@ def test_what_came_to_an_end_is_taken(case: Case, save: Save) -> None:
         ({"profile": "default"}, 'profile was "tuned", is "default"; settings.*'),
         ({"jitter": 50.0}, "jitter was 1.0, is 50.0"),
         ({"protocol": PROTOCOLS["paper"]}, 'protocol was "fast", is "paper"'),
-        ({"seed": 770001}, "--sim-seed was 10001, is 770001"),
+        ({"seed": 770001}, "seed was 10001, is 770001"),
         ({"timeout": 3.0}, "limits.timeout was 60.0, is 3.0"),
         ({"stall_timeout": 3.0}, "limits.stall_timeout was 20.0, is 3.0"),
         ({"memory_limit": 100.0}, "limits.memory_limit was null, is 100.0"),
@@ -123,7 +123,7 @@ def test_fewer_repetitions_than_recorded_are_refused_and_more_are_not(
     case: Case, save: Save
 ) -> None:
     resumed = save(*ended(case, Falling(), 1, 2, 3))
-    with pytest.raises(NotResumed, match="--reps was 3 or more, is 2"):
+    with pytest.raises(NotResumed, match="reps was 3 or more, is 2"):
         resumed.take(Experiment(case, Falling()), 2)
     assert len(resumed.take(Experiment(case, Falling()), 4)) == 3
     assert len(resumed.take(Experiment(case, Falling()), None)) == 3
@@ -239,6 +239,6 @@ def test_a_newer_schema_is_one_sentence(case: Case, save: Save) -> None:
     folder = save(*ended(case, Falling(), 1)).folder
     path = folder.path / "records.jsonl"
     path.write_text(path.read_text().replace('"schema": 2', '"schema": 9'))
-    newer = "--sim-resume: .*:1: schema 9 was written by a newer pytest-simbench"
-    with pytest.raises(pytest.UsageError, match=newer):
+    newer = ".*:1: schema 9 was written by a newer pytest-simbench"
+    with pytest.raises(RecordError, match=newer):
         Resumed(RunFolder(folder.path))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.plugin.variants import STEPS, Variant, around, variants
+from pytest_simbench.experiment.variants import STEPS, Variant, around, variants
 from pytest_simbench.records.series import step_text
 from pytest_simbench.simulator.settings import LARGEST_TIMESTEP, SHORTEST_TIMESTEP
 
