@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import contextvars
 import inspect
 import json
@@ -133,8 +132,7 @@ class ClosedLoop:
 
     def close(self) -> None:
         """End it, whatever state it is in."""
-        with contextlib.suppress(WorkerError):  # what ended it is told already
-            self._questions.close()
+        self._questions.close()
 
 
 def shipped(policy: Policy, seed: int, goal: Pose | None) -> dict[str, Any]:
