@@ -115,7 +115,7 @@ class GoalTask(Task):
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         with world.phase("settle start"):
             world.wait(0.2)
-        began, stayed = world.time, self._stays(seed)
+        began, stayed = world.time, self.stays(seed)
         world.mark("start")
         with world.phase("act"):
             world.control(
@@ -143,8 +143,8 @@ class GoalTask(Task):
             reasons=() if success else (f"{self.moved or 'tool'} not at its goal",),
         )
 
-    def _stays(self, seed: int) -> Callable[[Observation], bool]:
-        """Whether what is moved has been at the goal for long enough."""
+    def stays(self, seed: int) -> Callable[[Observation], bool]:
+        """Whether what is moved has been at the goal for long enough, asked again and again."""
         since: float | None = None
 
         def stays(seen: Observation) -> bool:

@@ -1,0 +1,1 @@
+"""Gymnasium environments: `making.make`. An extra: `pip install 'pytest-simbench[gym]'`."""
