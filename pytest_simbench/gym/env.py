@@ -88,7 +88,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    ) -> tuple[Any, dict[str, Any]]:
         """A new episode: the scene and the goal of the seed, or of one that chance draws.
 
         Raises:
@@ -122,9 +122,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         self._position, self._stays = loop.now.told[0], task.stays(self._seed)
         self._look(loop)
 
-    def step(
-        self, action: FloatArray
-    ) -> tuple[dict[str, FloatArray], float, bool, bool, dict[str, Any]]:
+    def step(self, action: FloatArray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Act for one period.
 
         Raises:

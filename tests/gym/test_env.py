@@ -7,20 +7,16 @@ import os
 import signal
 import subprocess
 import sys
-import tomllib
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from importlib.metadata import EntryPoint
-from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import psutil
 import pytest
-from gymnasium.envs.registration import namespace
 from gymnasium.error import InvalidAction, ResetNeeded, UnsupportedMode
 from gymnasium.utils.env_checker import check_env
 
@@ -38,17 +34,7 @@ from pytest_simbench.tasks.base import Jitter
 from pytest_simbench.tasks.goals import PushingToGoal, Reaching
 from tests.conftest import ADAPTERS, able_to, workers
 
-ROOT = Path(__file__).resolve().parents[2]
 SHORT = {"seconds": 0.4}
-
-
-def registered() -> None:
-    """As Gymnasium does where the distribution's metadata has the entry point."""
-    if "simbench/Reaching-v0" not in gymnasium.registry:
-        project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-        ((name, value),) = project["entry-points"]["gymnasium.envs"].items()
-        with namespace(name):
-            EntryPoint(name, value, "gymnasium.envs").load()()
 
 
 @contextmanager
@@ -67,7 +53,6 @@ def test_gymnasiums_checker_is_content(name: str) -> None:
     """It makes the environment again for its pictures: that takes long, and is asked of two."""
     if absent := missing(adapter(name).info):
         pytest.skip(absent)
-    registered()
     whole = name in ("mujoco", "pybullet")
     env = gymnasium.make("simbench/PickAndPlace-v0", simulator=name).unwrapped
     with warnings.catch_warnings():
@@ -155,18 +140,22 @@ def test_an_episode_ends_with_its_time_and_joints_move_as_told() -> None:
 
 
 @pytest.mark.engine
-def test_a_worker_that_dies_ends_the_episode_and_the_next_one_has_a_new_one() -> None:
+@pytest.mark.parametrize(("how", "told"), [(signal.SIGKILL, "SIGKILL"), (signal.SIGSTOP, "2 s")])
+def test_a_worker_that_dies_or_hangs_ends_the_episode_and_the_next_one_has_a_new_one(
+    how: signal.Signals, told: str
+) -> None:
     with made(**SHORT) as env:
+        env._handle.case = replace(env._handle.case, stall_timeout=2.0)
         before, _ = env.reset(seed=1)
-        os.kill(env._handle._process.pid, signal.SIGKILL)
+        os.kill(env._handle._process.pid, how)
         seen, _, terminated, truncated, info = env.step(np.zeros(5))
         assert (terminated, truncated) == (False, True)
-        assert "SIGKILL" in info["crashed"]
+        assert told in info["crashed"]
         np.testing.assert_array_equal(seen["observation"], before["observation"])
         again, _ = env.reset(seed=1)
         np.testing.assert_array_equal(again["observation"], before["observation"])
         env.step(np.zeros(5))
-        os.kill(env._handle._process.pid, signal.SIGKILL)
+        os.kill(env._handle._process.pid, how)
         env.reset()  # also one that died in between
 
 
@@ -286,7 +275,6 @@ def test_the_default_rate_is_whole_steps_of_every_engine() -> None:
 
 
 def test_gymnasium_knows_the_ids() -> None:
-    registered()
     for name, task in IDS.items():
         spec = gymnasium.spec(f"simbench/{name}")
         assert spec.kwargs == {"task": task}
