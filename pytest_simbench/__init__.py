@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from pytest_simbench.api.result import load as load
     from pytest_simbench.api.running import run as run
     from pytest_simbench.cli.values import BadInput as BadInput
+    from pytest_simbench.gym.making import make as make
+    from pytest_simbench.gym.making import make_vec as make_vec
     from pytest_simbench.scene.policy import Command as Command
     from pytest_simbench.scene.policy import Observation as Observation
     from pytest_simbench.scene.policy import Policy as Policy
@@ -19,6 +21,8 @@ LAZY = {
     "load": "api.result",
     "Run": "api.result",
     "BadInput": "cli.values",
+    "make": "gym.making",
+    "make_vec": "gym.making",
     **dict.fromkeys(("Command", "Observation", "Policy"), "scene.policy"),
 }
 """Names and where they live; imported when they are asked for, as every pytest run imports this."""

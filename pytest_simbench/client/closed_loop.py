@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.client.errors import PolicyFailed, WorkerError
+from pytest_simbench.client.errors import PolicyFailed
 from pytest_simbench.client.policies import Watched, shipped
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.ground.errors import PolicyError
@@ -130,8 +129,7 @@ class ClosedLoop:
 
     def close(self) -> None:
         """End it, whatever state it is in."""
-        with contextlib.suppress(WorkerError):  # what ended it is told already
-            self._questions.close()
+        self._questions.close()
 
 
 @dataclass(frozen=True)

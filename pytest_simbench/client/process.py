@@ -159,7 +159,8 @@ class WorkerProcess:
     def converse(self, operation: str, **arguments: Any) -> Generator[bytes, bytes | None, Any]:
         """A request during which the worker asks back: yields its questions, takes the replies.
 
-        Closing the generator ends the operation, as the reply None does; errors as `request`.
+        Closing the generator ends the operation, as the reply None does, and raises nothing; else
+        errors as `request`.
 
         Returns:
             The answer to the request.
@@ -171,7 +172,8 @@ class WorkerProcess:
                 reply = yield message
             except GeneratorExit:
                 connection.reply(None)
-                self._answer(operation, self._next(None, self._hung, connection.take))
+                with contextlib.suppress(WorkerError):  # what ended it is told already
+                    self._answer(operation, self._next(None, self._hung, connection.take))
                 raise
             connection.reply(reply)
         return self._answer(operation, message)

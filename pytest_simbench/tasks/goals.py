@@ -11,6 +11,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -26,6 +27,9 @@ from pytest_simbench.tasks.pushing import BLOCK_MASS, BLOCK_SIZE, FRICTION, RED
 
 HELD = 0.5
 """What is at its goal for so long [s] has come to stay."""
+
+SETTLE = 0.2
+"""Before the policy acts [s]."""
 
 GREEN = (0.25, 0.65, 0.35, 1.0)
 
@@ -61,12 +65,12 @@ class GoalTask(Task):
     settle: float = 0.5
     robot: Robot | None = None
 
-    @property
+    @cached_property  # asked at each observation
     def arm(self) -> Robot:
         """The robot that acts."""
         return self.robot or panda()
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """All lengths over those of an arm of full reach."""
         return scale_of(self.arm)
@@ -100,8 +104,8 @@ class GoalTask(Task):
         """Where what is moved shall be."""
 
     def draw(self, seed: int, low: Any, high: Any) -> Any:
-        """Numbers of a seed between two bounds; each call gives the same."""
-        return Randomness.of(seed).order.uniform(low, high)
+        """Numbers of a seed between two rows of bounds; each call gives the same."""
+        return _drawn(seed, tuple(low), tuple(high)).copy()
 
     def distance(self, seen: Observation | World, seed: int) -> float:
         """Of what is moved from its goal [m]."""
@@ -114,8 +118,8 @@ class GoalTask(Task):
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         with world.phase("settle start"):
-            world.wait(0.2)
-        began, stayed = world.time, self._stays(seed)
+            world.wait(SETTLE)
+        began, stayed = world.time, self.stays(seed)
         world.mark("start")
         with world.phase("act"):
             world.control(
@@ -143,8 +147,8 @@ class GoalTask(Task):
             reasons=() if success else (f"{self.moved or 'tool'} not at its goal",),
         )
 
-    def _stays(self, seed: int) -> Callable[[Observation], bool]:
-        """Whether what is moved has been at the goal for long enough."""
+    def stays(self, seed: int) -> Callable[[Observation], bool]:
+        """Whether what is moved has been at the goal for long enough, asked again and again."""
         since: float | None = None
 
         def stays(seen: Observation) -> bool:
@@ -183,7 +187,7 @@ class PushingToGoal(GoalTask):
 
     seconds: float = 20.0
 
-    @property
+    @cached_property
     def arm(self) -> Robot:
         """Its surface is as slippery as the block's."""
         return replace(self.robot or panda(), friction=FRICTION)
@@ -220,7 +224,7 @@ class PickAndPlace(GoalTask):
     seconds: float = 20.0
     tolerance: float = 0.025
 
-    @property
+    @cached_property
     def scale(self) -> float:
         return grasping_scale_of(self.arm)
 
@@ -239,6 +243,11 @@ class PickAndPlace(GoalTask):
         under = Pose.at(block[0], block[1], size / 2)
         stand = Box("stand", (2 * size, 2 * size, size), under, colour=GREEN)
         return Scene("pick and place", (cube("cube", pose, RED, self.scale), stand), self.arm)
+
+
+@lru_cache(64)
+def _drawn(seed: int, low: tuple[float, ...], high: tuple[float, ...]) -> Any:
+    return Randomness.of(seed).order.uniform(low, high)
 
 
 def name_of(policy: Any) -> str:
