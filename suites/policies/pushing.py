@@ -1,0 +1,73 @@
+"""Push a block to its goal: get behind it, come down, push towards the goal, and let go there."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from pytest_simbench.suites.policies import Controller, Limp
+
+from pytest_simbench.scene.policy import Command, Observation
+
+HIGH = 0.12
+"""Of the tool above the ground where it travels [m]."""
+
+
+class Push(Controller):
+    """Numbers: the hand comes down so far `behind` the block's centre [m], and pushes at a `height`
+    [m] at a `speed` [m/s], or `slow` [1/s] times what is left, and `gain` [1/s] times its distance
+    from the line to the goal sideways; it lets go at a distance `stop` [m] from the goal, and
+    starts again where it is `astray` [m] from the line. It travels at the speed `free` [m/s]."""
+
+    task, body = "pushing", "block"
+    bounds: ClassVar = {
+        "behind": (0.06, 0.10), "height": (0.008, 0.045), "speed": (0.03, 0.3),
+        "slow": (0.5, 5.0), "gain": (0.0, 6.0), "stop": (0.001, 0.02), "astray": (0.01, 0.05),
+        "free": (0.2, 1.0), "smoothing": (0.1, 1.0),
+    }  # fmt: skip
+
+    def reset(self, seed: int) -> None:
+        super().reset(seed)
+        self._done = False
+
+    def act(self, seen: Observation) -> Command:
+        n, block = self.numbers, self.look(seen)
+        tool = np.array(seen.tool.position)
+        way = np.array(seen.goal.position[:2]) - block
+        left = float(np.linalg.norm(way))
+        ahead = way / max(left, 1e-9)
+        sideways = np.array([-ahead[1], ahead[0]])
+        off = tool[:2] - block
+        self._done = left < n["stop"] + (0.015 if self._done else 0.0)
+        up = self.move(seen, (tool[0], tool[1], HIGH), n["free"])
+        if self._done:
+            return up
+        if tool[2] > n["height"] + 0.02:
+            place = block - n["behind"] * ahead
+            if np.linalg.norm(tool[:2] - place) < 0.01:
+                return self.move(seen, (*place, n["height"]), n["free"])
+            return up if tool[2] < HIGH - 0.03 else self.move(seen, (*place, HIGH), n["free"])
+        if abs(off @ sideways) > n["astray"] or off @ ahead > 0.0:
+            return up
+        speed = min(n["speed"], n["slow"] * left) * ahead - n["gain"] * (off @ sideways) * sideways
+        target = tool[:2] + speed / self.rate
+        return self.move(seen, (*target, n["height"]), n["free"])
+
+
+SCRIPTED = {
+    "behind": 0.075, "height": 0.03, "speed": 0.1, "slow": 1.5, "gain": 1.0, "stop": 0.005,
+    "astray": 0.03, "free": 0.4, "smoothing": 0.5,
+}  # fmt: skip
+
+TRAINED: dict[str, dict] = {}
+"""By name: on which engine (`tuned`) and seeds `train.py` found them, with how many generations of
+how many sets of numbers, each in how many episodes, and when."""
+
+policies = {
+    policy.name: policy
+    for policy in (
+        *(Push(name, found["numbers"]) for name, found in TRAINED.items()),
+        Push("scripted", SCRIPTED),
+        Limp(Push.task),
+    )
+}
