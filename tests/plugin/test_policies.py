@@ -1,4 +1,4 @@
-"""`--policies`: which tests are made of which policies, and what is said of a file that has none."""
+"""`--policies`: which tests are made of which policies, and what is said of a file without any."""
 
 from __future__ import annotations
 
@@ -82,8 +82,8 @@ def test_without_policies_the_shipped_ones_wait_for_their_file(pytester: pytest.
 )
 def test_what_is_no_policy(pytester: pytest.Pytester, spec: str, sentence: str) -> None:
     pytester.makepyfile(
-        mine=MINE, empty="", list="policies = [3]", broken="import gone", ends="raise SystemExit(3)",
-        number="policy = 3",
+        mine=MINE, empty="", list="policies = [3]", broken="import gone", number="policy = 3",
+        ends="raise SystemExit(3)",
     )  # fmt: skip
     pytester.makefile(".txt", text="policy = 3")
     usage_error(pytester.runpytest("--collect-only", f"--policies={spec}"), sentence)
