@@ -59,7 +59,26 @@ SCRIPTED = {
     "astray": 0.03, "free": 0.4, "smoothing": 0.5,
 }  # fmt: skip
 
-TRAINED: dict[str, dict] = {}
+TRAINED: dict[str, dict] = {
+    "mujoco-0": {
+        "sim": "mujoco", "seeds": (900000, 900063), "generations": 8, "population": 16,
+        "episodes": 8, "date": "2026-11-25",
+        "numbers": {
+            "behind": 0.07721, "height": 0.03771, "speed": 0.253, "slow": 3.707,
+            "gain": 0.841, "stop": 0.01032, "astray": 0.03606, "free": 0.7683,
+            "smoothing": 0.553,
+        },
+    },
+    "sapien-0": {
+        "sim": "sapien", "seeds": (900000, 900035), "generations": 6, "population": 16,
+        "episodes": 6, "date": "2026-11-25",
+        "numbers": {
+            "behind": 0.07606, "height": 0.03246, "speed": 0.2454, "slow": 3.343,
+            "gain": 4.954, "stop": 0.007118, "astray": 0.02972, "free": 0.4992,
+            "smoothing": 0.7583,
+        },
+    },
+}  # fmt: skip
 """By name: on which engine (`tuned`) and seeds `train.py` found them, with how many generations of
 how many sets of numbers, each in how many episodes, and when."""
 
