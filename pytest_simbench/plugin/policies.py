@@ -55,7 +55,7 @@ def parametrize(metafunc: pytest.Metafunc, found: list[Any]) -> None:
     from pytest_simbench.tasks.goals import name_of
 
     mark = metafunc.definition.get_closest_marker(MARK)
-    task, *names = mark.args if mark is not None else [""]
+    task, *names = (mark.args if mark is not None else ()) or ("",)
     chosen = [p for p in found if getattr(p, "task", "") in ("", task)]
     why, config = f"no policy of --policies is for the task {task!r}", metafunc.config
     stem = metafunc.definition.path.stem

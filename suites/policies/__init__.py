@@ -6,7 +6,7 @@ it looks. Both are drawn from the episode's seed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -21,7 +21,7 @@ DOWN = (0.0, 1.0, 0.0, 0.0)
 
 
 class Controller(Policy):
-    """A policy of a few numbers.
+    """A policy of a few numbers, given in the order of their bounds.
 
     Attributes:
         task: of the suite, that it is for.
@@ -34,10 +34,8 @@ class Controller(Policy):
     body = ""
     bounds: Mapping[str, tuple[float, float]] = {}
 
-    def __init__(self, name: str, numbers: Mapping[str, float]) -> None:
-        if numbers.keys() != self.bounds.keys():
-            raise ValueError(f"the policy {name} needs the numbers {', '.join(self.bounds)}")
-        self.name, self.numbers = name, dict(numbers)
+    def __init__(self, name: str, numbers: Iterable[float]) -> None:
+        self.name, self.numbers = name, dict(zip(self.bounds, numbers, strict=True))
 
     def reset(self, seed: int) -> None:
         self._rng = np.random.default_rng(seed)

@@ -63,14 +63,11 @@ SCRIPTED = {
 }  # fmt: skip
 
 TRAINED: dict[str, dict] = {}
-"""By name: on which engine (`tuned`) and seeds `train.py` found them, with how many generations of
-how many sets of numbers, each in how many episodes, and when."""
+"""What `train.py` found, by engine (profile `tuned`) and its own seed: in so many generations of so
+many sets of numbers in so many episodes each, of these seeds."""
 
 policies = {
-    policy.name: policy
-    for policy in (
-        *(Pick(name, found["numbers"]) for name, found in TRAINED.items()),
-        Pick("scripted", SCRIPTED),
-        Limp(Pick.task),
-    )
+    **{name: Pick(name, found["numbers"]) for name, found in TRAINED.items()},
+    "scripted": Pick("scripted", SCRIPTED.values()),
+    "limp": Limp(Pick.task),
 }

@@ -61,32 +61,19 @@ SCRIPTED = {
 
 TRAINED: dict[str, dict] = {
     "mujoco-0": {
-        "sim": "mujoco", "seeds": (900000, 900063), "generations": 8, "population": 16,
-        "episodes": 8, "date": "2026-11-25",
-        "numbers": {
-            "behind": 0.07721, "height": 0.03771, "speed": 0.253, "slow": 3.707,
-            "gain": 0.841, "stop": 0.01032, "astray": 0.03606, "free": 0.7683,
-            "smoothing": 0.553,
-        },
+        "sim": "mujoco", "seeds": (900000, 900063), "sets": (8, 16, 8), "date": "2026-11-25",
+        "numbers": (0.07721, 0.03771, 0.253, 3.707, 0.841, 0.01032, 0.03606, 0.7683, 0.553),
     },
     "sapien-0": {
-        "sim": "sapien", "seeds": (900000, 900035), "generations": 6, "population": 16,
-        "episodes": 6, "date": "2026-11-25",
-        "numbers": {
-            "behind": 0.07606, "height": 0.03246, "speed": 0.2454, "slow": 3.343,
-            "gain": 4.954, "stop": 0.007118, "astray": 0.02972, "free": 0.4992,
-            "smoothing": 0.7583,
-        },
+        "sim": "sapien", "seeds": (900000, 900035), "sets": (6, 16, 6), "date": "2026-11-25",
+        "numbers": (0.07606, 0.03246, 0.2454, 3.343, 4.954, 0.007118, 0.02972, 0.4992, 0.7583),
     },
 }  # fmt: skip
-"""By name: on which engine (`tuned`) and seeds `train.py` found them, with how many generations of
-how many sets of numbers, each in how many episodes, and when."""
+"""What `train.py` found, by engine (profile `tuned`) and its own seed: in so many generations of so
+many sets of numbers in so many episodes each, of these seeds."""
 
 policies = {
-    policy.name: policy
-    for policy in (
-        *(Push(name, found["numbers"]) for name, found in TRAINED.items()),
-        Push("scripted", SCRIPTED),
-        Limp(Push.task),
-    )
+    **{name: Push(name, found["numbers"]) for name, found in TRAINED.items()},
+    "scripted": Push("scripted", SCRIPTED.values()),
+    "limp": Limp(Push.task),
 }

@@ -9,7 +9,6 @@ on with mean and spread of the best. Episodes have seeds from `FIRST` on; none i
 from __future__ import annotations
 
 import argparse
-import json
 import tempfile
 from contextlib import closing
 from pathlib import Path
@@ -75,15 +74,14 @@ def main(arguments: list[str] | None = None) -> None:
                 first = seeds.stop
                 found = []
                 for row in drawn:
-                    numbers = dict(zip(controller.bounds, map(float, row), strict=True))
-                    found.append(score(handle, controller(name, numbers), seeds))
+                    found.append(score(handle, controller(name, map(float, row)), seeds))
                 best = np.argsort([-value for _, value in found])[:BEST]
                 mean, spread = drawn[best].mean(axis=0), drawn[best].std(axis=0)
                 spread = np.maximum(spread, 0.02 * (high - low))
                 successes = [found[number][0] for number in best]
                 print(f"{name} generation {generation + 1}: best {np.round(successes, 2)}, mean of "
                       f"all {np.mean([one for one, _ in found]):.2f}", flush=True)  # fmt: skip
-    print(json.dumps({k: float(f"{v:.4g}") for k, v in zip(controller.bounds, mean, strict=True)}))
+    print(f'"numbers": ({", ".join(f"{number:.4g}" for number in mean)}),')
 
 
 if __name__ == "__main__":
