@@ -18,9 +18,10 @@ from pytest_simbench.suites.policies.picking import Pick
 from pytest_simbench.suites.policies.pushing import Push
 from pytest_simbench.suites.test_transfer import TASKS
 
-from pytest_simbench.client.errors import WorkerError
+from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.motion.servo import Servo
 from pytest_simbench.tasks import Jitter
 
@@ -31,20 +32,36 @@ BEST = 4
 """Sets of numbers of a generation that the next one is drawn from."""
 
 
-def outcome(handle: SimulatorHandle, policy, seed: int) -> tuple[float, float]:
-    """Success, and the distance from the goal [m], of one episode."""
-    task = TASKS[policy.task](policy)
-    try:
-        with handle.episode(task.scene(seed, Jitter()), parity=False, kinematics=Servo) as world:
+class Engine:
+    """One engine in one worker; one that died is replaced."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        self.process: WorkerProcess | None = None
+
+    def outcome(self, policy, seed: int) -> tuple[float, float]:
+        """Success, and the distance from the goal [m], of one episode."""
+        task = TASKS[policy.task](policy)
+        if self.process is None or not self.process.alive:
+            where = Where(self.case.simulator, self.case.mode)
+            self.process = WorkerProcess(self.case.launch("train"), where)
+        try:
+            self.process.construct(self.case.profile)
+            world = World(self.process, task.scene(seed, Jitter()), kinematics=Servo)
             found = task.perform(world, seed, lambda done, of: None).metrics
-    except WorkerError:
-        return 0.0, 1.0
-    return found["success"], found["distance"]
+        except WorkerError:
+            self.close()
+            return 0.0, 1.0
+        return found["success"], found["distance"]
+
+    def close(self) -> None:
+        if self.process is not None:
+            self.process.kill()
 
 
-def score(handle: SimulatorHandle, policy, seeds) -> tuple[float, float]:
+def score(engine: Engine, policy, seeds) -> tuple[float, float]:
     """Share of successes, and what is improved: that, less the mean distance in decimetres."""
-    found = np.array([outcome(handle, policy, seed) for seed in seeds])
+    found = np.array([engine.outcome(policy, seed) for seed in seeds])
     success, distance = found.mean(axis=0)
     return float(success), float(success - 10 * min(distance, 0.2))
 
@@ -66,7 +83,7 @@ def main(arguments: list[str] | None = None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         case = Case.of(chosen.sim, test="train", mode="headless", profile="tuned",
                        folder=Path(folder))  # fmt: skip
-        with closing(SimulatorHandle(case)) as handle:
+        with closing(Engine(case)) as engine:
             for generation in range(chosen.generations):
                 drawn = rng.normal(mean, spread, (chosen.population, len(mean)))
                 drawn = np.clip(drawn, low, high)
@@ -74,7 +91,7 @@ def main(arguments: list[str] | None = None) -> None:
                 first = seeds.stop
                 found = []
                 for row in drawn:
-                    found.append(score(handle, controller(name, map(float, row)), seeds))
+                    found.append(score(engine, controller(name, map(float, row)), seeds))
                 best = np.argsort([-value for _, value in found])[:BEST]
                 mean, spread = drawn[best].mean(axis=0), drawn[best].std(axis=0)
                 spread = np.maximum(spread, 0.02 * (high - low))
