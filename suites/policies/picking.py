@@ -62,7 +62,22 @@ SCRIPTED = {
     "free": 0.5, "carries": 0.4, "down": 0.2, "near": 0.008, "smoothing": 0.5,
 }  # fmt: skip
 
-TRAINED: dict[str, dict] = {}
+TRAINED: dict[str, dict] = {
+    "mujoco-0": {
+        "sim": "mujoco", "seeds": (900000, 900019), "sets": (4, 12, 5), "date": "2026-11-25",
+        "numbers": (
+            0.1051, 0.02327, 0.6128, 0.1428, 0.006208, 0.3625,
+            1.063, 0.4612, 0.345, 0.01054, 0.8328,
+        ),
+    },
+    "sapien-0": {
+        "sim": "sapien", "seeds": (900000, 900019), "sets": (4, 12, 5), "date": "2026-11-25",
+        "numbers": (
+            0.104, 0.02392, 0.5239, 0.1393, 0.0006223, 0.1957,
+            1.069, 0.9764, 0.2933, 0.004203, 0.5429,
+        ),
+    },
+}  # fmt: skip
 """What `train.py` found, by engine (profile `tuned`) and its own seed: in so many generations of so
 many sets of numbers in so many episodes each, of these seeds."""
 
