@@ -221,6 +221,19 @@ def file(text: str, form: str = "a path") -> str:
     return text
 
 
+def policies(text: str) -> list[tuple[str, str]]:
+    """Files, separated by commas, each with a name in it behind a colon or without."""
+    found = []
+    for part in map(str.strip, text.split(",")):
+        path, name = file(part, "FILE.py or FILE.py:NAME"), ""
+        if not os.path.isfile(path) and ":" in path:
+            path, _, name = path.rpartition(":")
+        if not os.path.isfile(path):
+            raise BadValue(part, "there is no such file; give FILE.py or FILE.py:NAME")
+        found.append((path, name))
+    return found
+
+
 def robot(text: str) -> str:
     """A robot's name or file, or `all`."""
     return file(text, "a name (simbench robots), a robot file, or all")

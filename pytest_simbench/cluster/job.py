@@ -142,12 +142,15 @@ class Job:
         return Experiment(case, task)
 
     def pack(self) -> Packed:
-        """For the way to a node. The task's class and its bases travel as code, where their
-        modules are the tests' own; what else these import must be there on the node."""
+        """For the way to a node. The task's class, its policy and their bases travel as code, where
+        their modules are the tests' own; what else these import must be there on the node."""
         import cloudpickle
 
         with _packing, ExitStack() as stack:
-            for name in {kind.__module__ for kind in type(self.task).__mro__}:
+            policy = getattr(self.task, "policy", None)
+            policy = getattr(policy, "_act", policy)  # of a wrapped function
+            made = [policy, *type(policy).__mro__, *type(self.task).__mro__]
+            for name in {getattr(one, "__module__", "") for one in made}:
                 module = sys.modules.get(name)
                 if module is not None and not _installed(name, getattr(module, "__file__", None)):
                     cloudpickle.register_pickle_by_value(module)

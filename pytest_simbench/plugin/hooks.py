@@ -18,6 +18,8 @@ MARKS = (
     "xfail_sim(name, reason=): expected to fail on this simulator",
     "needs(*capabilities): run only on simulators that have these capabilities",
     "reps(n): repetitions of this test, unless --reps is given",
+    "policies(task, *names): the test's `policy` is each of --policies for this task, or for none "
+    "in particular; without that option, of the shipped ones those of these names",
     "repeats(parameter): the test repeats the task that this parameter holds; with --sim-jobs it "
     "may begin before the test does",
     "sim_conformance(kit): one test of each law of the conformance kit, see conformance_checks",
@@ -80,6 +82,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         session_of(metafunc.config).parametrize_conformance(metafunc)
     elif "simbench_robot" in metafunc.fixturenames:
         session_of(metafunc.config).parametrize_robot(metafunc)
+    if "policy" in metafunc.fixturenames and metafunc.definition.get_closest_marker("policies"):
+        session_of(metafunc.config).parametrize_policy(metafunc)
 
 
 @pytest.hookimpl(tryfirst=True)  # before -k and -m leave out tests

@@ -90,6 +90,9 @@ OPTIONS = (
     Option("--robot", read.robot, "robot that does the tasks: a name (simbench robots), a robot "
            "file (.toml), or all built-in ones (default: panda)", None, "NAME|FILE|all",
            long="--sim-robot"),
+    Option("--policies", read.policies, "Python files of policies that the tests of "
+           "suites/test_transfer.py ask (default: those of suites/policies); NAME is one of "
+           "several in a file", None, "FILE[:NAME],...", list, "args", long="--sim-policies"),
     Option("--sim-scene", read.file, "scene (MJCF, URDF) that the fixture `scene_file` gives; "
            "alone it runs the tests of suites/test_scene.py", None, "FILE", ini=""),
     Option("--sim-history", read.releases, "run the last N releases of a simulator, missing ones "

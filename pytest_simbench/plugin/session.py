@@ -60,6 +60,13 @@ class SimSession:
         return select(self.config)
 
     @cached_property
+    def policies(self) -> list[Any]:
+        """Those of `--policies`, read once."""
+        from pytest_simbench.plugin.policies import read
+
+        return read(self.config)
+
+    @cached_property
     def run(self) -> Run:
         """The run of this process; it begins when somebody asks for it."""
         from pytest_simbench.plugin.run import Run
@@ -89,6 +96,8 @@ class SimSession:
             options.given(config, item.name) for item in options.OPTIONS
         ):
             _ = self.selection
+        if options.mentioned(config, ["sim_policies"]):
+            _ = self.policies
 
     @pytest.hookimpl(tryfirst=True)  # before xdist starts its workers
     def pytest_sessionstart(self) -> None:
@@ -143,6 +152,12 @@ class SimSession:
             metafunc.parametrize(
                 "simbench_robot", list(robots), ids=ids, indirect=True, scope="session"
             )
+
+    def parametrize_policy(self, metafunc: pytest.Metafunc) -> None:
+        """Make a test of each policy for its task."""
+        from pytest_simbench.plugin.policies import parametrize
+
+        parametrize(metafunc, self.policies)
 
     def parametrize_conformance(self, metafunc: pytest.Metafunc) -> None:
         """Make a test of each law of the conformance kit, with the robots of `--robot`."""

@@ -10,6 +10,7 @@ import inspect
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar
@@ -21,7 +22,7 @@ from pytest_simbench.motion.model import grasping_scale_of, scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Robot, Scene
-from pytest_simbench.scene.policy import Observation
+from pytest_simbench.scene.policy import Function, Observation
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Randomness, Task, cube
 from pytest_simbench.tasks.pushing import BLOCK_MASS, BLOCK_SIZE, FRICTION, RED
 
@@ -123,7 +124,7 @@ class GoalTask(Task):
         world.mark("start")
         with world.phase("act"):
             world.control(
-                self.policy,
+                copy(self.policy),  # other repetitions may be under way
                 until=self.seconds if self.inside else stayed,
                 at_most=self.seconds,
                 rate=self.rate,
@@ -260,8 +261,9 @@ def digest(policy: Any) -> str:
     """Of a policy's source and of the numbers and texts that it holds; others (the weights of a
     network, for instance) do not count."""
     text = [name_of(policy)]
+    made = policy._act if isinstance(policy, Function) else policy
     with suppress(OSError, TypeError):
-        text.append(inspect.getsource(policy if inspect.isroutine(policy) else type(policy)))
+        text.append(inspect.getsource(made if inspect.isroutine(made) else type(made)))
     for name, value in sorted(getattr(policy, "__dict__", {}).items()):
         if isinstance(value, int | float | str | list | tuple | dict | np.ndarray):
             text.append(f"{name}={value!r}")

@@ -18,8 +18,9 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import describe_robot, expected
+from pytest_simbench.experiment.policy_file import read_policies
 from pytest_simbench.motion.registry import find
-from pytest_simbench.tasks import Stacking
+from pytest_simbench.tasks import Reaching, Stacking
 from tests.cluster.test_pool import A, Told
 from tests.tiny import Falling
 
@@ -42,6 +43,25 @@ def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
     command = [sys.executable, "-P", "-c", code]
     out = subprocess.run(command, input=packed, capture_output=True, check=True, cwd="/").stdout
     assert out.decode().strip() == "Falling(duration=0.25) ['landed']"
+
+
+@pytest.mark.parametrize("name", ["still", "wrapped"])
+def test_so_does_the_policy_of_a_file(case: Case, tmp_path: Path, name: str) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "class Still:\n    name = 'still'\n    def act(self, seen):\n        return seen\n"
+        "def act(seen):\n    return seen\n"
+        "policies = {'still': Still(), 'wrapped': act}\n"
+    )
+    (policy,) = read_policies(path, name)
+    packed = Job.of(Experiment(case, Reaching(policy))).pack().data
+    code = (
+        "import sys; from pytest_simbench.cluster.job import Job\n"
+        "print(Job.unpack(sys.stdin.buffer.read()).task.policy.act(3))"
+    )
+    command = [sys.executable, "-P", "-c", code]
+    out = subprocess.run(command, input=packed, capture_output=True, check=True, cwd="/").stdout
+    assert out.decode().strip() == "3"
 
 
 def test_a_class_that_travelled_can_be_derived_from(case: Case) -> None:

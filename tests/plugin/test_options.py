@@ -130,7 +130,7 @@ def test_jobs_auto_takes_the_cores_that_pytest_may_use(
 @pytest.mark.parametrize("option", [o for o in OPTIONS if o.long], ids=lambda o: o.flag)
 def test_the_sure_name_is_the_same_option(pytester: pytest.Pytester, option: Option) -> None:
     words = {"--sim": "mujoco", "--robot": "ur5", "--reps": "3", "--protocol": "smoke"}
-    word = {**words, "--jitter": "2"}.get(option.flag)
+    word = {**words, "--jitter": "2", "--policies": __file__}.get(option.flag)
     value = [] if word is None else [word]
     by_flag = options.value(pytester.parseconfig(option.flag, *value), option.name)
     by_long = options.value(pytester.parseconfig(option.long, *value), option.name)

@@ -1,0 +1,98 @@
+"""`--policies`: which tests are made of which policies, and what is said of a file without any."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.plugin.inner import records, usage_error
+
+MINE = """
+import numpy as np
+from pytest_simbench.scene.policy import Policy
+
+class Still(Policy):
+    rate = 10.0
+    task = "reaching"
+
+    def reset(self, seed):
+        self.start = None
+
+    def act(self, seen):
+        self.start = seen.position[:7] if self.start is None else self.start
+        return self.start
+
+class Other(Still):
+    name, task = "other", "elsewhere"
+
+def nothing(seen):
+    return None
+
+policies = {"still": Still(), "other": Other(), "nothing": nothing}
+"""
+
+TESTS = """
+import pytest
+from pytest_simbench.tasks import Reaching
+
+@pytest.mark.policies("reaching", "scripted")
+def test_reaching(repeat, policy):
+    repeat(Reaching(policy, seconds=0.2, settle=0.0, rate=10.0))
+"""
+
+
+def test_a_test_is_made_for_each_policy_of_its_task(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(mine=MINE, test_it=TESTS)
+    pytester.makepyfile(one="def policy(seen):\n    return None\n")
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco", "--reps=2", "--sim-jobs=2", "--sim-output=out",
+        "--policies=mine.py,one.py",
+    )  # fmt: skip
+    result.assert_outcomes(passed=3)
+    found = records("out")
+    name = "test_it.py::test_reaching[mujoco-headless-{}]"
+    assert [r["test"] for r in found[::2]] == [name.format(n) for n in ("still", "nothing", "one")]
+    assert [r["variant"] for r in found[::2]] == ["still", "nothing", "one"]
+    assert [r["settings"]["task.policy"] for r in found[::2]] == ["still", "nothing", "one"]
+    assert len({r["settings"]["task.policy_digest"] for r in found}) == 3
+
+
+def test_without_policies_the_shipped_ones_wait_for_their_file(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(test_it=TESTS.replace('"reaching", "scripted"', '"pushing", "scripted"'))
+    for arguments, shown in (
+        ((), "test_it.py::test_reaching[[]mujoco-headless-none[]]"),
+        (("test_it.py",), "test_it.py::test_reaching[[]mujoco-headless-scripted[]]"),
+    ):
+        result = pytester.runpytest_subprocess("--sim=mujoco", "--collect-only", "-q", *arguments)
+        result.stdout.fnmatch_lines([shown, "1 test collected*"])
+
+
+@pytest.mark.parametrize(
+    ("spec", "sentence"),
+    [
+        ("gone.py", "*--policies=gone.py: there is no such file; give FILE.py or FILE.py:NAME"),
+        ("mine.py:third", "*mine.py has no policy 'third'; choose from still, other, nothing"),
+        ("empty.py", "*empty.py defines neither a 'policy' nor a dict of 'policies'"),
+        ("list.py", "*list.py: policies is list, no dict of policies"),
+        ("broken.py", "*broken.py cannot be imported: ModuleNotFoundError: No module named 'gone'"),
+        ("ends.py", "*ends.py cannot be imported: SystemExit: 3"),
+        ("number.py", "*number.py: 3 is no policy: give a function of an observation*"),
+        ("text.txt", "*text.txt is no file of Python"),
+        ("mine.py:still,mine.py", "*two policies are named 'still'; give one of them another*"),
+    ],
+)
+def test_what_is_no_policy(pytester: pytest.Pytester, spec: str, sentence: str) -> None:
+    pytester.makepyfile(
+        mine=MINE, empty="", list="policies = [3]", broken="import gone", number="policy = 3",
+        ends="raise SystemExit(3)",
+    )  # fmt: skip
+    pytester.makefile(".txt", text="policy = 3")
+    usage_error(pytester.runpytest("--collect-only", f"--policies={spec}"), sentence)
+
+
+def test_one_of_several_by_its_name_and_a_module_beside_it(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        mine=MINE.replace("import numpy as np", "import beside"), beside="", test_it=TESTS
+    )
+    for name in ("nothing", "still"):
+        result = pytester.runpytest("--sim=mujoco", "--collect-only", f"--policies=mine.py:{name}")
+        result.stdout.fnmatch_lines([f"*test_reaching[[]mujoco-headless-{name}[]]*"])
