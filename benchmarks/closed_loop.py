@@ -35,7 +35,7 @@ def costs(name: str, seconds: float, pairs: int) -> None:
     process.construct()
     world = World(process, Stacking().scene(1, Jitter()), kinematics=Servo)
     step = adapter(name).profiles["tuned"].timestep
-    slow, fast = (1 / (round(1 / (rate * step)) * step) for rate in (50.0, 500.0))
+    slow, fast = (1 / (max(1, round(1 / (rate * step))) * step) for rate in (50.0, 500.0))
     both = [psutil.Process(process.pid), psutil.Process()]
 
     def cpu(act: Callable[[], object]) -> float:
