@@ -181,6 +181,7 @@ class WorkerProcess:
     def _ask(self, operation: str, arguments: Mapping[str, Any]) -> None:
         if self._connection.unread and not self._ended:
             self._unread()
+        self.launch.shorten_log()
         self.busy = True
         self._asked += 1
         self._connection.send({"op": operation, "number": self._asked, **pack(arguments)})
@@ -289,7 +290,6 @@ class WorkerProcess:
         began = time.monotonic()
         limit = self.launch.stall_timeout if timeout is None else timeout
         while True:
-            self.launch.shorten_log()
             # Signs of life put the end off, unless the request as a whole is limited.
             since = max(began, self._connection.heard) if timeout is None else began
             now, until, error = time.monotonic(), since + limit, late
@@ -300,7 +300,7 @@ class WorkerProcess:
             try:
                 return receive(min(until - now, LOOK_PERIOD))
             except TimeoutError:
-                continue
+                self.launch.shorten_log()
             except EOFError:
                 raise self._exited() from None
             except Exception as problem:  # of starting, of sending, or out of the bootstrap there

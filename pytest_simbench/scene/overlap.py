@@ -20,6 +20,15 @@ def rotations(quaternions: FloatArray) -> FloatArray:
     return np.moveaxis(unit_rotation(unit.T), 2, 0)
 
 
+def rotated(unit: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Vectors (n, 3) turned by unit quaternions (n, 4); half the time of `rotations`, per look."""
+    w, x, y, z = unit.T
+    a, b, c = vectors.T
+    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    turned = [a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p]
+    return np.array(turned).T
+
+
 def overlaps(
     offset: FloatArray,
     turn_a: FloatArray,

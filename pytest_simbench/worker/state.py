@@ -207,12 +207,11 @@ def check_following(simulator: Simulator, scene: Scene, joints: FloatArray, goal
 
 def _checked(title: str, values: Any, shape: tuple[int, ...]) -> FloatArray:
     """The array, if it is one of float64 of this shape."""
+    came = f"a {type(values).__name__}"
     if isinstance(values, np.ndarray):
-        came = f"{values.dtype} {values.shape}"
         if values.dtype == np.float64 and values.shape == shape:
             return values
-    else:
-        came = f"a {type(values).__name__}"
+        came = f"{values.dtype} {values.shape}"
     raise StateError(f"{title} must be an array of float64 {shape}, not {came}")
 
 

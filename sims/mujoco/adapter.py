@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pytest_simbench.description.carried import Carried
 from pytest_simbench.scene import FloatArray, Scene
-from pytest_simbench.scene.overlap import rotations
+from pytest_simbench.scene.overlap import rotated, rotations
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
@@ -175,14 +175,13 @@ class MuJoCo(Simulator):
         state = np.empty((len(self._body_q), 13))
         state[:, :7] = self.data.qpos[self._body_q]
         state[:, 7:10] = self.data.qvel[self._body_v]
-        local = self.data.qvel[self._body_v + 3]
-        state[:, 10:] = np.einsum("nij,nj->ni", rotations(state[:, 3:7]), local)
+        state[:, 10:] = rotated(state[:, 3:7], self.data.qvel[self._body_v + 3])
         return state
 
     def joint_state(self) -> FloatArray:
         if self._own_file is not None:
             return self._own_file.joint_state()
-        return np.stack([self.data.qpos[self._q], self.data.qvel[self._v]])
+        return np.array([self.data.qpos[self._q], self.data.qvel[self._v]])
 
     def save(self) -> FloatArray:
         kind = mujoco.mjtState.mjSTATE_INTEGRATION
