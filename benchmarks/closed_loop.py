@@ -45,24 +45,23 @@ def costs(name: str, seconds: float, pairs: int) -> None:
         return sum(sum(one.cpu_times()[:2]) for one in both) - before
 
     world.control(still, until=1.0, rate=slow)
-    robot = world.scene.robot
-    assert robot is not None
-    held = Trajectory.holding(seconds, robot.column("initial_position"))
-    shares, over_waiting, factors = [], [], []
+    held = Trajectory.holding(seconds, world.joints[0])
+    found = []
     for _ in range(pairs):
         waited = cpu(lambda: world.wait(seconds))
         alone = cpu(lambda: world.follow(held))
         asked = cpu(lambda: world.control(still, until=seconds, rate=slow))
-        shares.append(100 * (asked / alone - 1))
-        over_waiting.append(100 * (asked / waited - 1))
         began = time.perf_counter()
         world.control(Waving(0.1), until=seconds, rate=fast, inside=True)
-        factors.append(seconds / (time.perf_counter() - began))
+        times = seconds / (time.perf_counter() - began)
+        found.append((100 * (asked / alone - 1), 100 * (asked / waited - 1), times))
     process.close()
+    more, over_waiting, inside = (spread(values, ".1f") for values in zip(*found, strict=True))
     ms = f"{1000 * alone / seconds / slow:.2f} ms of steps between two questions"
-    print(f"{name}: asked at {slow:.3g} Hz, % of CPU more: {spread(shares, '.0f')}; {ms}")
-    print(f"{name}: more than waiting, which commands nothing: {spread(over_waiting, '.0f')} %")
-    print(f"{name}: inside at {fast:.3g} Hz, times real time: {spread(factors, '.1f')}", flush=True)
+    print(
+        f"{name}: asked at {slow:.3g} Hz, % of CPU more: {more}; than waiting: {over_waiting}; {ms}"
+    )
+    print(f"{name}: inside at {fast:.3g} Hz, times real time: {inside}", flush=True)
 
 
 if __name__ == "__main__":

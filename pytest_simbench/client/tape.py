@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.process import WorkerProcess
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.world import World
 from pytest_simbench.scene import FloatArray, Scene, SceneError
 
 ARRAYS = ("position", "velocity", "effort")

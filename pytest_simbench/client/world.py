@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,9 @@ from numpy.typing import NDArray
 from pytest_simbench.client.answers import Frame
 from pytest_simbench.client.closed_loop import Episode, Looking
 from pytest_simbench.client.errors import Diverged, EngineFailed, PolicyFailed
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.description.robot_files import with_content
 from pytest_simbench.ground.errors import PolicyError
 from pytest_simbench.ground.files import FileError
@@ -33,67 +34,6 @@ one. Those of a minute took 27 MB there, which looked like the simulator's memor
 
 LONGEST = 1e9
 """A wait [s]."""
-
-
-@dataclass(frozen=True)
-class Motion:
-    """States sampled during one motion or wait.
-
-    Attributes:
-        time: simulated time of each sample [s], (n,).
-        joints: positions and velocities, (n, 2, n_joints).
-        bodies: rows as `World.bodies`, (n, n_free, 13).
-    """
-
-    time: FloatArray
-    joints: FloatArray
-    bodies: FloatArray
-
-    def __len__(self) -> int:
-        return len(self.time)
-
-    @classmethod
-    def of(cls, states: Sequence[Observation]) -> Motion:
-        """The states of observations, one at least."""
-        return cls(
-            np.array([state.time for state in states]),
-            np.array([[state.position, state.velocity] for state in states]),
-            np.array([state.bodies for state in states]),
-        )
-
-    @classmethod
-    def joined(cls, parts: list[Motion]) -> Motion:
-        return cls(
-            np.concatenate([part.time for part in parts]),
-            np.concatenate([part.joints for part in parts]),
-            np.concatenate([part.bodies for part in parts]),
-        )
-
-
-class Stopwatch:
-    """Adds up wall seconds by name; the total runs from construction."""
-
-    def __init__(self) -> None:
-        self.started = time.perf_counter()
-        self.seconds: dict[str, float] = {}
-
-    @contextmanager
-    def measuring(self, name: str) -> Iterator[None]:
-        began = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.add(name, time.perf_counter() - began)
-
-    def add(self, name: str, seconds: float) -> None:
-        self.seconds[name] = self.seconds.get(name, 0.0) + seconds
-
-    def leave_out(self, seconds: float) -> None:
-        """What just took so long is none of what is timed."""
-        self.started += seconds
-
-    def elapsed(self) -> float:
-        return time.perf_counter() - self.started
 
 
 class World:

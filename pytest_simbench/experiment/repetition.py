@@ -18,9 +18,11 @@ from pytest_simbench.client.errors import (
     Where,
     WorkerError,
 )
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.resources import ResourceSampler
-from pytest_simbench.client.world import TRACE_PERIOD, Motion, Stopwatch, World
+from pytest_simbench.client.stopwatch import Stopwatch
+from pytest_simbench.client.world import TRACE_PERIOD, World
 from pytest_simbench.experiment.camera import Camera
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings

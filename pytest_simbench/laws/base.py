@@ -22,7 +22,8 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.motion import Motion
+from pytest_simbench.client.world import World
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.readings import Reading as Reading

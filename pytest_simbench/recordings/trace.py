@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.ground.files import FileError, read_arrays, read_json
 from pytest_simbench.recordings.figure import Figure, Mesh
 from pytest_simbench.records.paths import write_whole

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.ground.files import read_arrays, read_json
 from pytest_simbench.records import checked
 from pytest_simbench.records.paths import inside, write_whole

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.tape import Operation, Tape, TapedWorld
-from pytest_simbench.client.world import Motion
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.repeatability.perturbation import Perturbation, controller_delay, perturbed

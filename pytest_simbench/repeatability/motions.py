@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.records.repeatability import GROWTH_TIMES, StateDifference
 from pytest_simbench.scene import FloatArray
 

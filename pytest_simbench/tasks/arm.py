@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.motion import Motion
+from pytest_simbench.client.world import World
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.grasping import grasp_of
 from pytest_simbench.motion.kinematics import inverse_kinematics

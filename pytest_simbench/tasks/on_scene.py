@@ -12,7 +12,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.motion import Motion
+from pytest_simbench.client.world import World
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.records.metrics import RESOLUTIONS, Metric
 from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Robot, Scene, SceneError, Start

@@ -16,7 +16,8 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import brentq
 
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.motion import Motion
+from pytest_simbench.client.world import World
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError, Unreachable
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over, tool_path

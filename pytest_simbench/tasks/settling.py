@@ -9,7 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.errors import EngineFailed
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.motion import Motion
+from pytest_simbench.client.world import World
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.ground.errors import NotSupportedError

@@ -15,7 +15,7 @@ import coal
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.strain import strain
 from pytest_simbench.motion.throw import Throw, landing_x

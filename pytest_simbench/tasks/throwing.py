@@ -18,7 +18,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.motion import Motion
+from pytest_simbench.client.world import World
 from pytest_simbench.motion.errors import PlanningError, RobotError
 from pytest_simbench.motion.grasping import grasping
 from pytest_simbench.motion.model import RobotModel, grasping_scale_of

@@ -14,7 +14,8 @@ from typing import ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.motion import Motion
+from pytest_simbench.client.world import World
 from pytest_simbench.data import tosses as cube
 from pytest_simbench.data.measured import Half
 from pytest_simbench.data.tosses import Toss, Tosses

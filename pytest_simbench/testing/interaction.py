@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.laws.free import rotation_of
 from pytest_simbench.laws.hands import close_command, gravity_effort, hold_command
 from pytest_simbench.laws.impact import DeadLanding

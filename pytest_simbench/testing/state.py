@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.laws.hands import close_command
 from pytest_simbench.scene import Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import Capability

@@ -17,8 +17,9 @@ from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.environments import Environment, interpreter
 from pytest_simbench.client.errors import BadState, Diverged, Where, WorkerError
 from pytest_simbench.client.launch import Launch
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.process import WorkerProcess
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.world import World
 from pytest_simbench.description.urdf import ROOT
 from pytest_simbench.laws import Law
 from pytest_simbench.motion.panda import panda

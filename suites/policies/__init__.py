@@ -27,6 +27,7 @@ class Controller(Policy):
         task: of the suite, that it is for.
         body: that it looks at.
         bounds: of its numbers, by name: where training looks for them.
+        offset: as `OFFSET`.
     """
 
     rate = 10.0
@@ -34,12 +35,13 @@ class Controller(Policy):
     body = ""
     bounds: Mapping[str, tuple[float, float]] = {}
 
-    def __init__(self, name: str, numbers: Iterable[float]) -> None:
+    def __init__(self, name: str, numbers: Iterable[float], offset: float = OFFSET) -> None:
         self.name, self.numbers = name, dict(zip(self.bounds, numbers, strict=True))
+        self.offset = offset
 
     def reset(self, seed: int) -> None:
         self._rng = np.random.default_rng(seed)
-        self._offset = self._rng.normal(0.0, OFFSET, 2)
+        self._offset = self._rng.normal(0.0, self.offset, 2)
         self._place: np.ndarray | None = None
 
     def look(self, seen: Observation) -> np.ndarray:

@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 
 from pytest_simbench.client.answers import Frame
 from pytest_simbench.client.errors import Diverged, Where
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.tape import ARRAYS, Latency, Operation
-from pytest_simbench.client.world import Motion, World
+from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.scene import Pose, Scene

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.motion.panda import READY, panda
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Pose, Scene

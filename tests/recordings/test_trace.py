@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.motion.registry import known, known_robot

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.tape import Operation, Tape
-from pytest_simbench.client.world import Motion
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.repeatability.episode import Episode
 from pytest_simbench.repeatability.perturbation import Perturbation

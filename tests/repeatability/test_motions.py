@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.records.repeatability import StateDifference
 from pytest_simbench.repeatability.motions import _first_difference, difference, gaps
 

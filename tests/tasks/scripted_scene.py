@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.description.robot_files import keep
 from pytest_simbench.scene import Gripper, Joint, Pose, Robot, Scene, Trajectory
 

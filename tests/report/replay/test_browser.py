@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from pytest_simbench.client.world import Motion
+from pytest_simbench.client.motion import Motion
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.records.record import Record
