@@ -53,9 +53,9 @@ from pytest_simbench.records.configuration import TASK, text
 from pytest_simbench.records.record import Record, plain
 from pytest_simbench.records.series import RowKey, grouped
 
-METRIC, POLICY, REFERENCE = "success", f"{TASK}policy", f"{TASK}reference"
-"""The metric, and parameters of the task: name of the policy, and of the simulator by which MMRV is
-told (the first one where there is none). Others of a policy begin with `task.policy` too."""
+METRIC, POLICY = "success", f"{TASK}policy"
+"""The metric, and the parameter of the task that names the policy. Others of a policy begin with
+`task.policy` too."""
 
 DIGEST = f"{POLICY}_digest"
 """What tells apart two policies of one name."""
@@ -167,7 +167,6 @@ class Transfer:
 
     Attributes:
         outcomes: (simulators, policies, seeds), 1 for success; at least `FEWEST` seeds.
-        reference: place of the simulator by which MMRV is told.
         left_out: simulators that lack a policy.
     """
 
@@ -175,7 +174,6 @@ class Transfer:
     policies: Sequence[str]
     simulators: Sequence[Who]
     outcomes: Array
-    reference: int = 0
     left_out: Sequence[Who] = ()
 
     @property
@@ -215,13 +213,13 @@ class Transfer:
             return self.ceilings[first].tau
         return self.pairs[min(first, second), max(first, second)].tau
 
-    @cached_property
-    def mmrv(self) -> list[Interval]:
-        """Of each simulator."""
+    def mmrv(self, first: int, reference: int) -> Interval:
+        """MMRV of a simulator by another one, or by itself on other seeds."""
+        if first == reference:
+            return self.ceilings[first].mmrv
         (sums, drawn), n = self._sums, self.seeds
-        seen = mmrv(sums / n, sums[self.reference] / n).tolist()
-        by = drawn[self.reference] / n
-        return [_interval(mmrv(d / n, by), n, s) for d, s in zip(drawn, seen, strict=True)]
+        seen = float(mmrv(sums[first] / n, sums[reference] / n))
+        return _interval(mmrv(drawn[first] / n, drawn[reference] / n), n, seen)
 
     def verdict(self, first: int, second: int) -> Verdict:
         """`different`: ranks differ by more than the noise. `alike`: tau-b lies within two narrow
@@ -269,7 +267,7 @@ def transfers(records: Iterable[Record]) -> list[Transfer]:
 def _work(record: Record) -> tuple[Any, ...]:
     """What policies were asked for."""
     mine = {k: plain(v) for k, v in record.settings.items() if k.startswith(TASK)}
-    same = {k: v for k, v in mine.items() if not k.startswith((POLICY, REFERENCE))}
+    same = {k: v for k, v in mine.items() if not k.startswith(POLICY)}
     return record.task, text(same), record.robot.get("name"), record.jitter
 
 
@@ -293,8 +291,6 @@ def _transfer(records: Sequence[Record]) -> Transfer | None:
         return None
     outcomes = np.array([[[found[w][p][s] for s in seeds] for p in policies] for w in whole])
     order = np.argsort(-outcomes.sum((0, 2)), kind="stable")
-    named = next((r.settings[REFERENCE] for r in records if REFERENCE in r.settings), None)
-    place = next((k for k, who in enumerate(whole) if who[0] == named), 0)
     left_out = [who for who in found if who not in whole]
     known = [policies[k] for k in order]
-    return Transfer(records[0].task, known, whole, outcomes[:, order], place, left_out)
+    return Transfer(records[0].task, known, whole, outcomes[:, order], left_out)

@@ -69,8 +69,8 @@ def test_the_tables(four: Report) -> None:
     assert list(success) == ["simulator", "quick %", "slow %", "limp %"]
     assert success["quick %"] == ["90 [68, 99]", "90 [68, 99]", "5 [0, 25]", "100 [83, 100]"]
     assert ranks["a"] == ["1.00 [1.00, 1.00]", "1.00 [1.00, 1.00]", "-1.00 [-1.00, -1.00]", "-"]
-    assert violations["MMRV by a"][1] == "0.00 [0.00, 0.00]"
-    assert violations["MMRV by a"][2].startswith("0.72 ")  # 0.85, 0.45 and 0.85
+    assert violations["by a"][1] == "0.00 [0.00, 0.00]"
+    assert violations["by a"][2].startswith("0.72 ")  # 0.85, 0.45 and 0.85
     assert violations["seeds"] == ["20", "20", "20", "-"]
 
 
@@ -96,7 +96,7 @@ def test_terminal_markdown_and_page_tell_it_first(four: Report, tmp_path: Path) 
     assert title == "transfer of pushing"
     assert "5 [0, 25]" in text
     assert "MMRV" not in text
-    assert "MMRV by a" in next(sections(four, 100, True))[1]
+    assert "by a" in next(sections(four, 100, True))[1]
     written = markdown(four)
     assert written.index("## Transfer of pushing") < written.index("## pushing")
     assert answer[2] in written
