@@ -84,10 +84,17 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
     the effort limit and nothing else: without gravity nothing depends on its position. After
     0.1 s p <= 1.05 limit t, and >= 0.8 limit t so that the limit is reached. A declared lack
     of rotor inertia is left out of M. An arm whose limit would turn it by more than 1 rad in that
-    time, had it no rotor, gets the time for 1 rad."""
+    time, had it no rotor, gets the time for 1 rad, none more than the drive law saturates for."""
     robot = scenes.lifted(subject.arm)
-    start, limit = robot.column("initial_position"), robot.joints[0].effort_limit
-    seconds = min(0.1, (2 * 1.0 * own_inertia(robot, start, 0, armature=False) / limit) ** 0.5)
+    start, first = robot.column("initial_position"), robot.joints[0]
+    limit, late = first.effort_limit, first.damping / first.stiffness
+    gain = limit / own_inertia(robot, start, 0, has_armature(subject))
+    left = abs(_far(robot)) - limit / first.stiffness  # until k (q* - q) = d q' + limit
+    seconds = min(
+        0.1,
+        (2 * 1.0 * own_inertia(robot, start, 0, armature=False) / limit) ** 0.5,
+        (late**2 + 2 * left / gain) ** 0.5 - late,
+    )
     require_limit_reached(subject, robot, 0, _far(robot), seconds)
 
 
