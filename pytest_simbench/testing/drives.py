@@ -84,10 +84,17 @@ def effort_limit_bounds_acceleration(subject: Subject) -> None:
     the effort limit and nothing else: without gravity nothing depends on its position. After
     0.1 s p <= 1.05 limit t, and >= 0.8 limit t so that the limit is reached. A declared lack
     of rotor inertia is left out of M. An arm whose limit would turn it by more than 1 rad in that
-    time, had it no rotor, gets the time for 1 rad."""
+    time, had it no rotor, gets the time for 1 rad, none more than the drive law saturates for."""
     robot = scenes.lifted(subject.arm)
-    start, limit = robot.column("initial_position"), robot.joints[0].effort_limit
-    seconds = min(0.1, (2 * 1.0 * own_inertia(robot, start, 0, armature=False) / limit) ** 0.5)
+    start, first = robot.column("initial_position"), robot.joints[0]
+    limit, late = first.effort_limit, first.damping / first.stiffness
+    gain = limit / own_inertia(robot, start, 0, has_armature(subject))
+    left = abs(_far(robot)) - limit / first.stiffness  # until k (q* - q) = d q' + limit
+    seconds = min(
+        0.1,
+        (2 * 1.0 * own_inertia(robot, start, 0, armature=False) / limit) ** 0.5,
+        (late**2 + 2 * left / gain) ** 0.5 - late,
+    )
     require_limit_reached(subject, robot, 0, _far(robot), seconds)
 
 
@@ -111,7 +118,26 @@ def require_limit_reached(
 def _far(robot: Robot) -> float:
     """A far way of joint 1, away from the nearer of its limits [rad]."""
     model, start = RobotModel(robot), robot.joints[0].initial_position
-    return 2.0 if model.upper[0] - start >= start - model.lower[0] else -2.0
+    return 2.5 if model.upper[0] - start >= start - model.lower[0] else -2.5
+
+
+@check(robot=any_robot)
+def saturated_drive_settles(subject: Subject) -> None:
+    """The drive of joint 1, at its effort limit on the way to a set point, brakes in time: by the
+    drive law from k (q* - q) = d q' on. On a way of half of limit / inertia (d / k)^2, at most 1
+    rad, its limit can do that: without gravity the joint passes the set point by at most 5 % of
+    the way, and after 10 d / k it stands so near."""
+    robot = scenes.lifted(subject.arm)
+    start, first = robot.column("initial_position"), robot.joints[0]
+    late = first.damping / first.stiffness
+    inertia = own_inertia(robot, start, 0, has_armature(subject))
+    way = float(np.sign(_far(robot))) * min(1.0, first.effort_limit / inertia * late**2 / 2)
+    with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
+        world.follow(Trajectory.holding(subject.timestep, start + way * np.eye(len(start))[0]))
+        motion = logged(world.wait(10 * late, log_period=0))
+    left = 1 - (motion.joints[:, 0, 0] - start[0]) / way
+    require_close("share of the way that joint 1 goes too far", max(0.0, -left.min()), 0, 0.05, "")
+    require_close("share of the way that is left to joint 1", float(left[-1]), 0.0, 0.05, "")
 
 
 @check(robot=any_robot)

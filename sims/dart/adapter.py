@@ -1,10 +1,14 @@
 """DART (the physics engine inside Gazebo), through its Python bindings dartpy.
 
 Drives are DART's own servo motors: velocity constraints with the effort limit as largest force,
-solved together with the contacts. Each step they are told the velocity v* + `position_gain`
-(q* - timestep v* - q) / timestep, as Gazebo's ros2_control does it (its gain is 0.1). DART's
-other drive, spring and damper with a rest position, is implicit too but knows no effort limit,
-and contact impulses do not feel its damping: at rest against a contact only m / (m + timestep d)
+solved together with the contacts. Each step h they are told the velocity at which the scene's
+drive law (`scene.Joint`) asks for no effort at its end, (k (q* - q) + d v*) / (h k + d): they are
+that law, infinitely stiff at the same k / d. What is told a higher velocity, as by a share of the
+error in each step (0.5 of it: 500/s against k / d = 10/s), brakes too late once its effort
+saturates, and swings: the Panda's joint 5 at 40 rad/s.
+
+DART's other drive, spring and damper with a rest position, is implicit too but knows no effort
+limit, and contact impulses do not feel its damping: at rest against a contact only m / (m + h d)
 of the spring's force arrives, a quarter for a finger. So it is no drive, and only what joints have
 of their own. A joint that has a motor alone (`scene.Joint`) is of DART's kind `FORCE`.
 
@@ -38,6 +42,9 @@ from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, DARTSettings
 
 dartpy = lazy_import("dartpy")
+
+WEAKEST = 1e-9
+"""Least resistance h k + d of a drive [N m s/rad or N s/m]: a joint may have neither."""
 
 State = tuple[float, list[tuple[FloatArray, FloatArray, FloatArray]], FloatArray]
 """Time, positions, velocities and accelerations of each skeleton, the command."""
@@ -193,8 +200,9 @@ class DART(Simulator):
         self._index = np.array([names.index(name) for name in robot.joint_names])
         self._motors = np.array([joint.motor for joint in robot.joints])
         driven = np.array([name not in followers for name in robot.joint_names]) & ~self._motors
-        self._gain = driven * (self.settings.position_gain / self.settings.timestep)
-        self._share = driven * (1 - self.settings.position_gain)
+        k, d, step = robot.column("stiffness"), robot.column("damping"), self.settings.timestep
+        resistance = np.maximum(step * k + d, WEAKEST)
+        self._gain, self._share = driven * k / resistance, driven * d / resistance
         if robot.couplings:
             self._couplings = Couplings(skeleton, names, robot.couplings)
         initial = robot.column("initial_position")

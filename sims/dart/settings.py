@@ -20,8 +20,6 @@ class DARTSettings(Settings):
             pyramid) or `nsgs` (block Gauss-Seidel, Coulomb's cone).
         sweeps: largest number of passes of `pgs` and `nsgs`, DART's default for `nsgs`.
         tolerance: where they stop earlier; for `nsgs` the violation of the law of contact [m/s].
-        position_gain: share of the position error that the drives correct in a step; the default
-            is that of gz_ros2_control, DART has none.
         sleeping: whether bodies at rest are frozen.
         split_impulse: correct penetrations by a velocity of their own.
     """
@@ -31,12 +29,11 @@ class DARTSettings(Settings):
     solver: Literal["dantzig", "pgs", "nsgs"] = "dantzig"
     sweeps: int = 100
     tolerance: float = 1e-5
-    position_gain: float = 0.1
     sleeping: bool = True
     split_impulse: bool = False
 
 
-TUNED = DARTSettings(detector="ode", solver="nsgs", tolerance=1e-4, position_gain=0.5)
+TUNED = DARTSettings(detector="ode", solver="nsgs", tolerance=5e-5)
 
 PROFILES: Mapping[str, Settings] = {
     "default": DARTSettings(),

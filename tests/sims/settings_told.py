@@ -135,11 +135,7 @@ def told_dart(s: Any) -> Told:
     if s.settings.solver == "nsgs":
         options = inner.getOptions()
         told |= {"sweeps": options.maxSweeps, "tolerance": options.tolerance}
-    position, first = s.joint_state()[0], s._index[0]
-    s.command(position + 0.01, 0 * position, 0 * position)
-    s.step()
-    gain = s._robot.getCommands()[first] * told["timestep"] / 0.01
-    return told | {"position_gain": gain}
+    return told
 
 
 def told_ode(s: Any) -> Told:

@@ -50,13 +50,13 @@ def test_motors_keep_the_effort_limits() -> None:
 
 
 def test_the_drives_are_asked_for_speed_and_place() -> None:
-    """Of a servo: a share of the position error in a step, and the rest of the set speed."""
-    simulator = world(scenes.arm_alone(), position_gain=0.3)
+    """Of a servo: the velocity at which the drive law asks for no effort, k / d = 10/s."""
+    simulator = world(scenes.arm_alone())
     position = simulator.joint_state()[0]
     simulator.command(position + 0.01, 0 * position + 0.2, 0 * position)
     simulator.step()
     asked = simulator._robot.getCommands()[simulator._index[:7]]
-    assert asked == pytest.approx(0.3 * 0.01 / simulator.settings.timestep + 0.7 * 0.2)
+    assert asked == pytest.approx((10 * 0.01 + 0.2) / (1 + 10 * simulator.settings.timestep))
 
 
 def squeeze(simulator: DART) -> tuple[float, float]:

@@ -87,7 +87,7 @@ TOLD: dict[str, tuple[Changes, ...]] = {
     "dart": (
         {
             "timestep": 0.002, "detector": "bullet", "solver": "nsgs", "sweeps": 33,
-            "tolerance": 1e-3, "position_gain": 0.3, "sleeping": False, "split_impulse": True,
+            "tolerance": 1e-3, "sleeping": False, "split_impulse": True,
         },
         {"detector": "ode", "solver": "nsgs"},
         {"detector": "dart", "solver": "pgs"},

@@ -124,6 +124,7 @@ WORLDS: dict[str, tuple[tuple[Tamper, ...], tuple[str, ...]]] = {
     "DeepGround": ((add("model.geom_pos", -0.003, lambda s: (ground(s), 2)),
                     put("model.geom_sameframe", 0, ground)), ("rest_on_plane",)),
     "SoftDrives": (SOFT, ("static_hold",)),
+    "LateBrakes": ((times("model.actuator_biasprm", 0.1, (ALL, 2)),), ("saturated_drive_settles",)),
     "FreeFingers": ((put("data.eq_active", 0),), ("fingers_stay_coupled",)),
 }  # fmt: skip
 """In every scene."""
