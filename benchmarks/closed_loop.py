@@ -4,7 +4,7 @@
 
 Bounds, MuJoCo: at 50 Hz at most 15 % of the CPU time of the same set points as a trajectory, worker
 and this process together; at 500 Hz inside the worker, faster than real time. Rates are the nearest
-that are whole steps. Waiting, following and asking are measured in turn, in one worker.
+that are whole steps. The three are measured in turn, in one worker.
 """
 
 from __future__ import annotations
@@ -58,9 +58,7 @@ def costs(name: str, seconds: float, pairs: int) -> None:
     process.close()
     more, over_waiting, inside = (spread(values, ".1f") for values in zip(*found, strict=True))
     ms = f"{1000 * alone / seconds / slow:.2f} ms of steps between two questions"
-    print(
-        f"{name}: asked at {slow:.3g} Hz, % of CPU more: {more}; than waiting: {over_waiting}; {ms}"
-    )
+    print(f"{name}: at {slow:.3g} Hz, % of CPU more: {more}; than waiting: {over_waiting}; {ms}")
     print(f"{name}: inside at {fast:.3g} Hz, times real time: {inside}", flush=True)
 
 
