@@ -189,8 +189,9 @@ def word(text: str) -> str:
 
 
 def profiles(text: str) -> tuple[str, ...]:
-    """Names, separated by commas, each once."""
-    return tuple(dict.fromkeys(map(word, text.split(","))))
+    """Names, or files that end in .toml, separated by commas, each once."""
+    parts = (part.strip() for part in text.split(","))
+    return tuple(dict.fromkeys((file if p.endswith(".toml") else word)(p) for p in parts))
 
 
 def simulator(text: str) -> str:
