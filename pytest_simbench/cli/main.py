@@ -64,6 +64,8 @@ COMMANDS = (
             "here, and how to get the others", "", (
                 Argument("names", read.simulator, "NAME", "say of this one what it is, where it "
                          "is, and how to get it; NAME==VERSION is a release", "*"),
+                Argument("--settings", read.simulator, "SIM", "print the settings of this "
+                         "simulator, what simbench tune may search, and what they are"),
                 Argument("--cluster", read.address, "ADDRESS", "ask the nodes of this cluster "
                          "instead of this machine"),
             ), "tell what each can do, and where it deviates from a scene"),
