@@ -304,6 +304,18 @@ def span(text: str) -> Span:
     return Span(found[1], found[2], found[3])
 
 
+def duration(text: str) -> float:
+    """A time in seconds, minutes or hours [s]."""
+    form = r"(\d+\.?\d*|\.\d+)\s*(s|min|h)"
+    found = _matched(text, form, "give a time: 90s, 30min or 2h", lambda m: len(m[1]) < 10)
+    return float(found[1]) * {"s": 1.0, "min": 60.0, "h": 3600.0}[found[2].lower()]
+
+
+def words(text: str) -> list[str]:
+    """Names, separated by commas."""
+    return [word(part) for part in text.split(",")]
+
+
 def metric(text: str) -> str:
     """The name of a metric."""
     return str(_matched(text, r"\w{1,100}", "give the name of a metric")[0])
