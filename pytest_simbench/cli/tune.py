@@ -25,6 +25,7 @@ from pytest_simbench.report.figures.front import draw
 from pytest_simbench.report.files import shown
 from pytest_simbench.simulator.profile_file import write_profile
 from pytest_simbench.simulator.ranges import in_words
+from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tuning.judging import SEEDS, judged, recommended
 from pytest_simbench.tuning.search import Search, folder_name, front, space_of
 from pytest_simbench.tuning.target import FIRST_CHOSEN, FIRST_JUDGED
@@ -59,15 +60,16 @@ def tune(
     Raises:
         BadInput, SimulatorError: what cannot be; one sentence.
     """
-    wanted = target_of(target, cost or "cpu_cost", error, seeds or 4, SEEDS)
     chosen, variant = _selected(sim, profile)
+    can = adapter(variant.simulator).info.capabilities
+    wanted = target_of(target, cost or "cpu_cost", error, seeds or 4, SEEDS, can)
     name, base = variant.simulator, chosen.settings(variant.simulator, variant.profile)
     space = space_of(base, settings, name)
     budget, seed = budget or BUDGET, 1 if seed is None else seed
     parts = (name, target, variant.profile, wanted.cost, error, seeds, seed, *map(str, space))
     path = Path(output) if output else Path(RUNS) / folder_name(parts)
     with closing(_locked(path)) as folder, closing(LocalExecutor(1)) as executor:
-        with refusing((RecordError, NotResumed)):
+        with refusing(RecordError):
             resumed = Resumed(folder) if folder.holds_run else None
         case = chosen.case(variant, test="tune", folder=path)
         looks = Trials(wanted, case, executor, printed(True), folder, resumed)
@@ -77,9 +79,10 @@ def tune(
         if resumed:
             print(f"goes on with {len(resumed.records)} repetitions of {shown(path, Path.cwd())}")
         try:
-            done = search.run(SEARCHING * budget, trials)
-            found, why = recommended(done, looks)
-            halves = _judge(looks, done[0], found, (1 - SEARCHING) * budget)
+            with refusing(NotResumed):
+                done = search.run(SEARCHING * budget, trials)
+                found, why = recommended(done, looks)
+                halves = _judge(looks, done[0], found, (1 - SEARCHING) * budget)
         except KeyboardInterrupt:
             print("interrupted; the same command goes on")
             raise

@@ -7,12 +7,14 @@ would have; and what it has recorded it does not repeat."""
 from __future__ import annotations
 
 import json
+import math
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from pytest_simbench.ground.names import file_name
 from pytest_simbench.simulator.ranges import Linear, Log, Searched, changes, searched
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.tuning.target import TuningError
@@ -21,8 +23,8 @@ from pytest_simbench.tuning.trials import Candidate, Trials
 JOURNAL = "optuna.log"
 """Of the trials, in the run folder: lines of JSON."""
 
-STARTUP = 15
-"""Trials at random before the sampler learns from them."""
+STARTUP = 10
+"""Trials before the sampler learns from them."""
 
 FEWEST = 3
 """Candidates that a budget must be enough for."""
@@ -96,8 +98,8 @@ class Search:
         took = sum(record.seconds["total"] for record in today.records.values())
         if seconds < FEWEST * took and most is None:
             raise TuningError(
-                f"a budget of {seconds:.0f} s is too small: today's settings alone took {took:.0f} "
-                f"s; give at least {1 + 4 * took / 60:.0f}min"
+                f"{seconds:.0f} s are too few to search: today's settings alone took {took:.0f} s; "
+                f"give a budget of at least {1 + 4 * took / 60:.0f}min"
             )
         study = self._study(library)
         known = {self._key({}): today}
@@ -133,7 +135,8 @@ class Search:
                 directions=["minimize", "minimize"],
             )  # fmt: skip
         if fresh:
-            study.enqueue_trial(self._own())
+            for values in self._first():
+                study.enqueue_trial(values)
         return study
 
     def _trial(self, library: Any, study: Any, number: int) -> Any:
@@ -171,6 +174,22 @@ class Search:
             return trial.suggest_int(one.name, int(one.over.low), int(one.over.high), log=log)
         return float(f"{trial.suggest_float(one.name, one.over.low, one.over.high, log=log):.4g}")
 
+    def _first(self) -> list[dict[str, Any]]:
+        """Today's values, and each with one changed: half-way to either end of its range on its
+        scale, or another choice. Most settings that are drawn at random do not work at all."""
+        own, found = self._own(), [self._own()]
+        for one in self.space:
+            if isinstance(one.over, tuple):
+                others = [choice for choice in one.over if choice != own.get(one.name, choice)]
+            elif one.name in own:
+                others = [
+                    _between(own[one.name], end, one) for end in (one.over.high, one.over.low)
+                ]
+            else:
+                others = []
+            found += [{**own, one.name: value} for value in others if value != own[one.name]]
+        return found
+
     def _own(self) -> dict[str, Any]:
         """Today's values, as far as they lie where is searched."""
         found = {}
@@ -194,6 +213,12 @@ class Search:
         return min(cost, 10 * today.cost()), self.trials.error(found)
 
 
+def _between(value: float, end: float, one: Searched) -> float:
+    """Half-way to an end of the range; a whole number where the setting wants one."""
+    middle = math.sqrt(value * end) if isinstance(one.over, Log) else (value + end) / 2
+    return round(middle) if one.whole else middle
+
+
 def front(done: Sequence[Candidate], trials: Trials) -> list[Candidate]:
     """The candidates that none beats in both cost and error, the cheapest first."""
     found: list[Candidate] = []
@@ -206,6 +231,4 @@ def front(done: Sequence[Candidate], trials: Trials) -> list[Candidate]:
 
 def folder_name(parts: Sequence[object]) -> str:
     """Of the run folder of a search: the same for the same search."""
-    from pytest_simbench.ground.names import file_name
-
     return file_name("tune-" + "-".join(map(str, parts[:2])), *parts[2:])

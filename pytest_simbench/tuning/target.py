@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from pytest_simbench.ground.errors import SimulatorError
@@ -12,6 +12,7 @@ from pytest_simbench.laws.held_out import held_out
 from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.records.phenomena import PHENOMENA
 from pytest_simbench.records.record import Record
+from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Pushing, Stacking, Throwing
 from pytest_simbench.tasks.base import Task
 
@@ -112,7 +113,14 @@ class Target:
         return math.exp(sum(map(math.log, worst.values())) / len(worst))
 
 
-def target(name: str, cost: str, error: str | None, seeds: int, judged: int) -> Target:
+def target(
+    name: str,
+    cost: str,
+    error: str | None,
+    seeds: int,
+    judged: int,
+    can: Collection[Capability] = tuple(Capability),
+) -> Target:
     """What a command line names.
 
     Args:
@@ -120,6 +128,7 @@ def target(name: str, cost: str, error: str | None, seeds: int, judged: int) -> 
         cost: of `records.metrics.COSTS`.
         error: the metric to choose by; None for the task's own.
         seeds, judged: of a task, for choosing and for judging, at most.
+        can: what the simulator can do; laws that need more are left out.
 
     Raises:
         TuningError: there is nothing of that name; lists what there is.
@@ -131,7 +140,9 @@ def target(name: str, cost: str, error: str | None, seeds: int, judged: int) -> 
     if colon and kind == LAWS_WORD:
         if error is not None:
             raise TuningError("--error: laws have their own, in tolerances; leave it out")
-        laws = _laws(rest.split(","))
+        laws = [law for law in _laws(rest.split(",")) if {*law.needs} <= {*can}]
+        if not laws:
+            raise TuningError(f"{name}: the simulator cannot do any of these laws")
         others = [other for law in laws if (other := held_out(law)) is not None]
         halves = (tuple(Look(law, k) for k in TIMES for law in half) for half in (laws, others))
         return Target(name, cost, next(halves), next(halves))
