@@ -14,6 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.simulator.ranges import Linear, Log, Searched, changes, searched
 from pytest_simbench.simulator.settings import Settings
@@ -107,6 +109,8 @@ class Search:
         while number < len(study.trials) or (
             time.monotonic() - began < seconds and (most is None or number < most)
         ):
+            if number % 2 and number == len(study.trials):
+                study.enqueue_trial(self._step(number))
             trial = self._trial(library, study, number)
             values = self._suggested(trial) if trial else study.trials[number].user_attrs["values"]
             asked = changes(values, self.base)
@@ -190,11 +194,28 @@ class Search:
             found += [{**own, one.name: value} for value in others if value != own[one.name]]
         return found
 
-    def _own(self) -> dict[str, Any]:
-        """Today's values, as far as they lie where is searched."""
+    def _step(self, number: int) -> dict[str, Any]:
+        """The values of a point of the front with one changed: to an end of its range or half-way
+        there, where Optuna's sampler hardly comes, or another choice."""
+        rng = np.random.default_rng([self.seed, number])
+        best = front(self.done, self.trials)
+        point, one = (
+            best[int(rng.integers(len(best)))],
+            self.space[int(rng.integers(len(self.space)))],
+        )
+        found = self._own(point.changes)
+        if isinstance(one.over, tuple):
+            return {**found, one.name: one.over[rng.integers(len(one.over))]}
+        end = (one.over.low, one.over.high)[rng.integers(2)]
+        half = rng.integers(2) and one.name in found
+        return {**found, one.name: _between(found[one.name], end, one) if half else end}
+
+    def _own(self, changed: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Today's values, some changed, as far as they lie where is searched."""
         found = {}
+        settings = {**vars(self.base), **(changed or {})}
         for one in self.space:
-            value = getattr(self.base, one.setting)
+            value = settings[one.setting]
             value = value if one.part is None else value[one.part]
             inside = value in one.over if isinstance(one.over, tuple) else (
                 value is not None and one.over.low <= value <= one.over.high
