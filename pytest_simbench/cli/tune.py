@@ -8,6 +8,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
+from pytest_simbench.cli.main import INTERRUPTED
 from pytest_simbench.cli.runs import RUNS, printed
 from pytest_simbench.cli.selection import Selection, check, profiles_of
 from pytest_simbench.cli.values import BadInput, refusing
@@ -85,7 +86,7 @@ def tune(
                 halves = _judge(looks, done[0], found, (1 - SEARCHING) * budget)
         except KeyboardInterrupt:
             print("interrupted; the same command goes on")
-            raise
+            return INTERRUPTED
         lines = [*_front(done, found, looks), "", *_verdict(halves, found, why, looks)]
         print(for_terminal("\n".join(["", *lines])))
         if found is not done[0]:

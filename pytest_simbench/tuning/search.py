@@ -106,7 +106,8 @@ class Search:
         study = self._study(library)
         known = {self._key({}): today}
         number = 0
-        while number < len(study.trials) or (
+        begun = sum(trial.state.name != "WAITING" for trial in study.trials)
+        while number < begun or (
             time.monotonic() - began < seconds and (most is None or number < most)
         ):
             if number % 2 and number == len(study.trials):

@@ -59,6 +59,13 @@ def test_it_goes_on_as_if_it_had_not_been_interrupted(tmp_path: Path) -> None:
     assert not {*kept} & {*second.asked}
 
 
+def test_it_makes_no_more_trials_than_it_may(tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    one, executor = search(tmp_path)
+    one.run(1e9, 3)
+    assert {variant for variant, _ in executor.asked} <= {"today", "trial0", "trial1", "trial2"}
+
+
 def test_a_setting_that_does_not_act_is_not_asked_for(tmp_path: Path) -> None:
     pytest.importorskip("optuna")
     base = adapter("drake").profiles["default"]
