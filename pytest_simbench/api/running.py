@@ -11,7 +11,14 @@ from pytest_simbench.api.result import Run
 from pytest_simbench.cli import values as read
 from pytest_simbench.cli.names import read_names
 from pytest_simbench.cli.runs import RUNS, printed
-from pytest_simbench.cli.selection import EVERY, Selection, check, checked_task, robots_of
+from pytest_simbench.cli.selection import (
+    EVERY,
+    Selection,
+    check,
+    checked_task,
+    profiles_of,
+    robots_of,
+)
 from pytest_simbench.cli.values import BadInput, BadValue, refusing
 from pytest_simbench.client.display import Displays
 from pytest_simbench.client.errors import (
@@ -72,7 +79,8 @@ def run(
         protocol: `fast`, `paper` (as the study) or `smoke` (smallest).
         seed: of the first repetition; the next ones follow.
         jitter: scale of the start jitter; 1 is 1 mm and 1 degree.
-        profile: of the settings: `default`, `tuned`, `real`; several with commas between them.
+        profile: of the settings: `default`, `tuned`, `real`, a TOML file; several with commas
+            between them.
         settings: that are changed, for each simulator: `{"mysim": {"timestep": 0.001}}`.
         robot: that does the task: a name, a robot file, or a robot; default: the task's own.
         gui: in the simulators' own windows.
@@ -151,15 +159,17 @@ def _chosen(
             raise BadInput(f"settings: give those of each simulator by its name: {example}")
     with refusing(SimulatorError):
         names, builds = read_names([name for name in asked if name != EVERY], Path.cwd())
+        profiles, files = profiles_of(_read("profile", profile, read.profiles))
         every = known() if EVERY in asked else []
         chosen = Selection(
             tuple(dict.fromkeys([*every, *names])),
             ("gui" if gui else "headless",),
-            _read("profile", profile, read.profiles),
+            profiles,
             settings or {},
             builds,
             robots={robot.name: robot} if isinstance(robot, Robot) else robots_of(robot, "robot"),
             named=tuple(names),
+            files=files,
         )
         check(chosen, makes=False)
     if len(chosen.robots) > 1:

@@ -64,6 +64,8 @@ COMMANDS = (
             "here, and how to get the others", "", (
                 Argument("names", read.simulator, "NAME", "say of this one what it is, where it "
                          "is, and how to get it; NAME==VERSION is a release", "*"),
+                Argument("--settings", read.simulator, "SIM", "print the settings of this "
+                         "simulator, what simbench tune may search, and what they are"),
                 Argument("--cluster", read.address, "ADDRESS", "ask the nodes of this cluster "
                          "instead of this machine"),
             ), "tell what each can do, and where it deviates from a scene"),
@@ -94,6 +96,23 @@ COMMANDS = (
                 Argument("metric", read.metric, "METRIC", "that is worse in BAD"),
                 Argument("arguments", str, "...", "tests and options of pytest",
                          argparse.REMAINDER),
+            )),
+    Subcommand("tune", "cli.tune:tune", "search settings that give this truth for the least cost",
+            "It searches for three quarters of the budget, and judges on what it did not search "
+            "by. The same command goes on where it was interrupted.", (
+                Argument("target", read.word, "TARGET", "laws:NAME,... (laws or phenomena), "
+                         "stacking, throwing or pushing"),
+                Argument("--sim", read.simulator, "NAME", "whose settings; simbench list "
+                         "--settings NAME prints them"),
+                Argument("--profile", read.profiles, "NAME|FILE", "today's (default: tuned)"),
+                Argument("--settings", read.words, "NAME,...", "search these alone"),
+                Argument("--cost", read.word, "COST", "default: cpu_cost"),
+                Argument("--error", read.word, "METRIC", "of a task (default: its own)"),
+                Argument("--budget", read.duration, "TIME", "default: 30min"),
+                Argument("--trials", read.REPETITIONS, "N", "at most"),
+                Argument("--seeds", read.REPETITIONS, "N", "of a task, to choose by (default: 4)"),
+                Argument("--seed", read.SEED, "SEED", "of the search (default: 1)"),
+                Argument("--output", read.file, "DIR", "folder of the run"),
             )),
     Subcommand("stats", "measure.__main__:main", "print what the suites' claims let pass"),
     Subcommand("replay", "repeatability.__main__:main", "replay an episode that a failing test "

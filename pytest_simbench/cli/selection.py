@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from pytest_simbench.ground.errors import SettingsError
 from pytest_simbench.ground.versions import base_name
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator import registry
+from pytest_simbench.simulator.profile_file import ENDING, ProfileFile, read_profile
 from pytest_simbench.simulator.settings import Settings
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class Selection:
     Attributes:
         simulators: names, in order.
         modes: `headless`, `gui`.
-        profiles: settings profiles.
+        profiles: settings profiles, those of files by their labels.
         changes: simulator name to changed settings; those of a bare name hold for all
             of its versions.
         pythons, specs: simulator name to interpreter or execnet specification.
@@ -42,6 +43,8 @@ class Selection:
         nodes: of the cluster that carries repetitions out; none for this machine.
         sweep: time steps to make each test for [s]; True for those around each profile's own, None
             for these alone.
+        named: the simulators that were asked for by name.
+        files: the profiles of files, by their labels.
     """
 
     simulators: tuple[str, ...]
@@ -54,6 +57,7 @@ class Selection:
     nodes: tuple[Node, ...] = ()
     sweep: bool | tuple[float, ...] | None = None
     named: tuple[str, ...] = ()
+    files: Mapping[str, ProfileFile] = field(default_factory=dict)
 
     @property
     def every_robot(self) -> bool:
@@ -72,7 +76,7 @@ class Selection:
             if self.sweep is None or unknown:
                 found.append(Variant(name, mode, profile))
             else:
-                own = self._settings(name, profile).timestep
+                own = self.settings(name, profile).timestep
                 found += variants(name, mode, profile, own, self.sweep)
         return found
 
@@ -115,25 +119,30 @@ class Selection:
             python=self.pythons.get(of.simulator),
             spec=self.specs.get(of.simulator),
             mode=of.mode,
-            profile=of.profile,
+            profile=self.files.get(of.profile, of.profile),
             own_timestep=of.own_timestep,
             changes={**(changes or {}), **self.changes_of(of.simulator), **of.changes},
             robot=self.robots[of.robot],
             **more,
         )
 
-    def _settings(self, name: str, profile: str) -> Settings:
-        """Of a simulator, in a profile, as the user changed them.
+    def settings(
+        self, name: str, profile: str, changes: Mapping[str, Any] | None = None
+    ) -> Settings:
+        """Of a simulator, in a profile, with changes; what the user changed goes on top.
 
         Raises:
             SettingsError: it has no such profile, or cannot take a change.
         """
-        return registry.settings_of(name, profile, self.changes_of(name))
+        changes = {**(changes or {}), **self.changes_of(name)}
+        if file := self.files.get(profile):
+            return file.settings(name, changes)
+        return registry.settings_of(name, profile, changes)
 
     def settings_problem(self, name: str, profile: str) -> str | None:
         """Why a simulator has no such profile, or cannot take a change; None when it can."""
         try:
-            self._settings(name, profile)
+            self.settings(name, profile)
         except SettingsError as error:
             return str(error)
         return None
@@ -154,9 +163,10 @@ def check(selection: Selection, makes: bool) -> None:
         profile for name in registry.registered() for profile in registry.adapter(name).profiles
     )
     for profile in selection.profiles:
-        if profile not in valid:
+        if profile not in valid and profile not in selection.files:
             raise BadInput(
-                f"no simulator has a settings profile {profile!r}; choose from {', '.join(valid)}"
+                f"no simulator has a settings profile {profile!r}; choose from "
+                f"{', '.join(valid)}, or give a file that ends in .toml"
             )
     if isinstance(selection.sweep, tuple) and (wrong := problem(selection.sweep)):
         raise BadInput(wrong)
@@ -176,6 +186,17 @@ def check(selection: Selection, makes: bool) -> None:
     for name in selection.named:
         if reason := selection.unusable(name, to_install=makes):
             raise BadInput(reason)
+
+
+def profiles_of(asked: Sequence[str]) -> tuple[tuple[str, ...], dict[str, ProfileFile]]:
+    """Profiles as they are asked for, with those of files by label.
+
+    Raises:
+        SettingsError: a file that holds none.
+    """
+    found = [read_profile(name) if name.endswith(ENDING) else name for name in asked]
+    files = {one.label: one for one in found if isinstance(one, ProfileFile)}
+    return tuple(one if isinstance(one, str) else one.label for one in found), files
 
 
 def robots_of(text: str | Path | None, where: str = "--robot") -> Mapping[str, Robot | None]:

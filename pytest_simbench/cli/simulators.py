@@ -12,7 +12,9 @@ from pytest_simbench.client import environments
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.report.model.capabilities import columns
 from pytest_simbench.report.terminal.grid import render
+from pytest_simbench.simulator.ranges import in_words, meanings, searched
 from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
+from pytest_simbench.simulator.settings import Settings
 
 Missing = Callable[[str], str | None]
 """Why a simulator whose adapter is fine cannot run, with what mends it; None when it can."""
@@ -21,7 +23,10 @@ HEADINGS = ("simulator", "version", "ready", "tuned", "real", "step")
 
 
 def list_simulators(
-    names: Sequence[str] = (), verbose: bool = False, cluster: str | None = None
+    names: Sequence[str] = (),
+    verbose: bool = False,
+    cluster: str | None = None,
+    settings: str | None = None,
 ) -> int:
     """Print a table of all simulators, or a paragraph for each that is named.
 
@@ -29,11 +34,15 @@ def list_simulators(
         names: as `--sim` takes them; none for all.
         verbose: tell of each what it can do and where it deviates from the scene.
         cluster: address of the scheduler whose nodes count, instead of this machine.
+        settings: print the settings of this simulator instead.
 
     Raises:
         BadInput: an interpreter that cannot be used.
         SimulatorError: an unknown or broken simulator; no such cluster.
     """
+    if settings is not None:
+        print(for_terminal("\n".join(_settings(settings))))
+        return 0
     chosen, builds = read_names(names, Path.cwd())
     for name in chosen:
         adapter(name)  # complains of a broken one
@@ -82,6 +91,25 @@ def _table(missing: Missing) -> Iterator[str]:
         row = ("-", row) if isinstance(row, str) else row
         padded = [text.ljust(width) for text, width in zip(row, widths, strict=False)]
         yield "  ".join([name.ljust(first), *padded]).rstrip()
+
+
+def _settings(name: str) -> Iterator[str]:
+    """A line for each setting; profiles of another kind (of a user's file) have a table each."""
+    of_kind: dict[type[Settings], dict[str, Settings]] = {}
+    for profile, one in adapter(name).profiles.items():
+        of_kind.setdefault(type(one), {})[profile] = one
+    for kind, profiles in of_kind.items():
+        ranges: dict[str, list[str]] = {}
+        for part in searched(kind):
+            ranges.setdefault(part.setting, []).append(str(part))
+        rows = [(name, *profiles, "searched", "meaning")]
+        for setting, meaning in meanings(kind).items():
+            values = (in_words(getattr(one, setting)) for one in profiles.values())
+            rows.append((setting, *values, ", ".join(ranges.get(setting, "-")), meaning))
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        for row in rows:
+            padded = (text.ljust(width) for text, width in zip(row, widths, strict=True))
+            yield "  ".join(padded).rstrip()
 
 
 def _paragraphs(

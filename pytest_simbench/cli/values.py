@@ -189,8 +189,9 @@ def word(text: str) -> str:
 
 
 def profiles(text: str) -> tuple[str, ...]:
-    """Names, separated by commas, each once."""
-    return tuple(dict.fromkeys(map(word, text.split(","))))
+    """Names, or files that end in .toml, separated by commas, each once."""
+    parts = (part.strip() for part in text.split(","))
+    return tuple(dict.fromkeys((file if p.endswith(".toml") else word)(p) for p in parts))
 
 
 def simulator(text: str) -> str:
@@ -301,6 +302,18 @@ def span(text: str) -> Span:
     form = rf"([\w-]{{1,100}}):{version}\.\.{version}"
     found = _matched(text, form, advice, lambda found: found[2] != found[3])
     return Span(found[1], found[2], found[3])
+
+
+def duration(text: str) -> float:
+    """A time in seconds, minutes or hours [s]."""
+    form = r"(\d+\.?\d*|\.\d+)\s*(s|min|h)"
+    found = _matched(text, form, "give a time: 90s, 30min or 2h", lambda m: len(m[1]) < 10)
+    return float(found[1]) * {"s": 1.0, "min": 60.0, "h": 3600.0}[found[2].lower()]
+
+
+def words(text: str) -> list[str]:
+    """Names, separated by commas."""
+    return [word(part) for part in text.split(",")]
 
 
 def metric(text: str) -> str:

@@ -14,9 +14,10 @@ from pytest_simbench.client.launch import Launch
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.series import short
-from pytest_simbench.records.tuned_on import FIRST_SEED
+from pytest_simbench.records.tuned_on import FIRST_SEED, Seen
 from pytest_simbench.scene import Robot
-from pytest_simbench.simulator.registry import adapter, address
+from pytest_simbench.simulator.profile_file import ENDING, ProfileFile, read_profile
+from pytest_simbench.simulator.registry import adapter, address, seeds_seen
 from pytest_simbench.tasks.base import Task
 
 
@@ -89,6 +90,7 @@ class Case:
         folder: the run folder.
         attempt: of the same repetitions in this process, see `records.record`.
         robot: that does the tasks; None for the tasks' own.
+        file: the file that the profile is of; None for one of the adapter's.
         own_timestep: of the profile [s], where `changes` has another one for a sweep over steps;
             its records tell it (`notes`), and so that they belong to a sweep.
     """
@@ -121,22 +123,42 @@ class Case:
     attempt: int = 1
     robot: Robot | None = None
     own_timestep: float | None = None
+    file: ProfileFile | None = None
 
     @classmethod
-    def of(cls, simulator: str, *, python: str | None = None, **more: Any) -> Case:
+    def of(
+        cls,
+        simulator: str,
+        *,
+        profile: str | ProfileFile,
+        changes: Mapping[str, Any] | None = None,
+        python: str | None = None,
+        **more: Any,
+    ) -> Case:
         """A case of a registered simulator, as it is run on this machine.
 
         Args:
             simulator: its name.
+            profile: the name of one of its profiles, or a TOML file with one.
+            changes: single settings, on top of that.
             python: interpreter of the worker; None for the engine's own, or this one.
-            more: further attributes; at least `test`, `mode`, `profile` and `folder`.
+            more: further attributes; at least `test`, `mode` and `folder`.
 
         Raises:
-            SimulatorError: no such simulator, or its adapter is broken.
+            SimulatorError: no such simulator, its adapter is broken, or the file is no profile of
+                it.
         """
         info = adapter(simulator).info
+        changes = dict(changes or {})
+        if isinstance(profile, str) and profile.endswith(ENDING):
+            profile = read_profile(profile)
+        if isinstance(profile, ProfileFile):
+            profile.settings(simulator)
+            more["file"], changes = profile, {**profile.changes, **changes}
         return cls(
             simulator=simulator,
+            profile=profile.label if isinstance(profile, ProfileFile) else profile,
+            changes=changes,
             adapter=address(simulator) or "",
             python=python or interpreter(info),
             environment=Environment.of(info).variables(),
@@ -144,6 +166,16 @@ class Case:
             compile_timeout=info.compile_timeout,
             **more,
         )
+
+    @property
+    def base(self) -> str:
+        """The adapter's profile that the settings begin with."""
+        return self.file.base if self.file else self.profile
+
+    @property
+    def chosen_on(self) -> tuple[Seen, ...]:
+        """What the profile was chosen on."""
+        return self.file.seen(self.adapter) if self.file else seeds_seen(self.adapter, self.profile)
 
     @property
     def short_name(self) -> str:

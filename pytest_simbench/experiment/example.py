@@ -89,7 +89,8 @@ def write_example(
     world = scene.to_wire()
     if scene.robot is not None and scene.robot.name in ROBOTS:
         world["robot"] = {k: v for k, v in world["robot"].items() if k not in ROBOT_FILES}
-    kept = {key: getattr(case, key) for key in ("test", "simulator", "mode", "profile")}
+    kept = {key: getattr(case, key) for key in ("test", "simulator", "mode")}
+    kept["profile"] = case.base
     example = {
         "schema": SCHEMA,
         "case": {**kept, "changes": dict(case.changes), "versions": dict(versions or {})},

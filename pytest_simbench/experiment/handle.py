@@ -89,9 +89,7 @@ class SimulatorHandle:
             except DisplayError as error:
                 raise DisplayLost(str(error), where) from None
         self._process.deadline = time.monotonic() + (case.timeout or EPISODE_TIMEOUT)
-        self.constructed = self._process.construct(
-            case.profile, case.changes, gui=case.mode == "gui"
-        )
+        self.constructed = self._process.construct(case.base, case.changes, gui=case.mode == "gui")
         return TapedWorld(self._process, scene, parity=parity, **options)
 
     def _keep_example(self, error: Exception, scene: Scene, tape: list[Any]) -> None:

@@ -78,7 +78,7 @@ def settings(case: Case) -> dict[str, Any]:
     """The simulator's settings; empty for an adapter that is not registered under its name."""
     if address(case.simulator) != case.adapter:
         return {}  # its module may do anything when it is imported
-    return settings_of(case.simulator, case.profile, case.changes).to_wire()
+    return settings_of(case.simulator, case.base, case.changes).to_wire()
 
 
 def versions(case: Case) -> dict[str, str]:

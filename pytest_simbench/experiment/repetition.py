@@ -36,7 +36,6 @@ from pytest_simbench.records.record import Failure, Record, Status
 from pytest_simbench.scene import Scene
 from pytest_simbench.scene.policy import Kinematics
 from pytest_simbench.simulator import DescriptionError
-from pytest_simbench.simulator.registry import seeds_seen
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.worker.stepping import CHECK_PERIOD
 from pytest_simbench.worker.wire import LONGEST, named, readable, told
@@ -210,7 +209,7 @@ class Repetition:
                 self._killed.wait(case.protocol.before)
                 self._enter("launch")
             self._constructed = process.construct(
-                case.profile,
+                case.base,
                 case.changes,
                 gui=case.mode == "gui",
                 real_time=case.protocol.real_time,
@@ -283,7 +282,8 @@ class Repetition:
             closing=self._closing or "",
             untested=self._constructed.untested or "",
             own_timestep=case.own_timestep,
-            chosen_on=seeds_seen(case.adapter, case.profile),
+            chosen_on=case.chosen_on,
+            profile_file=case.file.path if case.file else "",
             sample=self.experiment.task.sample(self.seed),
             reading=outcome.reading,
         )

@@ -87,15 +87,15 @@ def make(
         check_number(jitter, "the jitter", 0.0)
         info = adapter(str(simulator)).info
         rhythm = Rhythm(chosen.rate, chosen.command_latency, chosen.observation_delay)
-        rhythm.steps(settings_of(simulator, profile, {}).timestep)
+        case = Case.of(
+            simulator, python=python, test=chosen.name, mode="headless", profile=profile,
+            jitter=jitter, folder=Path(),
+        )  # fmt: skip
+        rhythm.steps(settings_of(simulator, case.base, case.changes).timestep)
     if (problem := chosen.problem()) or (python is None and (problem := missing(info))):
         raise BadInput(problem)
     if render_mode and Capability.OFFSCREEN not in info.capabilities:
         raise BadInput(f"{simulator} draws no pictures outside a window: leave render_mode out")
-    case = Case.of(
-        simulator, python=python, test=chosen.name, mode="headless", profile=profile,
-        jitter=jitter, folder=Path(),
-    )  # fmt: skip
     many = [
         TaskEnv(chosen, case, rhythm, actions, reward, render_mode) for _ in range(num_envs or 1)
     ]

@@ -12,7 +12,9 @@ import pytest
 from pytest_simbench.cli.values import ANY_NUMBER, BadInput, BadValue, refusing, shown
 
 if TYPE_CHECKING:
+    from pytest_simbench.cli.selection import Selection
     from pytest_simbench.experiment.experiment import Experiment
+    from pytest_simbench.experiment.variants import Variant
     from pytest_simbench.tasks.base import Task
 
 
@@ -61,10 +63,9 @@ def refuse_second(task: Task, done: list[Task]) -> None:
     done.append(task)
 
 
-def checked_settings(value: Any, simulator: str, profile: str) -> dict[str, Any]:
+def checked_settings(value: Any, of: Variant, chosen: Selection) -> dict[str, Any]:
     """What the fixture `sim_settings` gives, if the simulator can take it; else the test fails."""
     from pytest_simbench.ground.errors import SettingsError
-    from pytest_simbench.simulator.registry import settings_of
 
     if not isinstance(value, Mapping):
         _refuse(
@@ -72,7 +73,7 @@ def checked_settings(value: Any, simulator: str, profile: str) -> dict[str, Any]
             "by name, {'timestep': 0.001} for instance"
         )
     with failing(SettingsError, "the fixture sim_settings"):
-        settings_of(simulator, profile, value)
+        chosen.settings(of.simulator, of.profile, value)
     return dict(value)
 
 

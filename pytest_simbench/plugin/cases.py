@@ -50,7 +50,7 @@ def case_of(
         function, others = named(item, made_for.id_with(len(chosen.profiles)))
         of_test = {"test": item.nodeid, "function": function, "variant": others}
         timeout = timeout if timeout is not None else number_mark(item, "sim_timeout")
-        own = arguments.checked_settings(settings, name, made_for.profile)
+        own = arguments.checked_settings(settings, made_for, chosen)
     return chosen.case(
         made_for,
         own,

@@ -114,8 +114,8 @@ OPTIONS = (
            "study's)", None, "SECONDS"),
     Option("--sim-stall-timeout", read.SECONDS, "longest silence of a worker in seconds", 60.0,
            "SECONDS", rare=True),
-    Option("--sim-profile", read.profiles, "settings profile: default, tuned or real; several "
-           "(default,tuned) make each test for each", ("tuned",), "NAME"),
+    Option("--sim-profile", read.profiles, "settings profile: default, tuned, real or a TOML "
+           "file; several (default,tuned) make each test for each", ("tuned",), "NAME|FILE"),
     Option("--sim-sweep", read.steps, "make each test for several time steps: for these [s], or, "
            "without any, for six from four times the profile's own to an eighth of it", None,
            "STEP,...", ini="", bare=True),

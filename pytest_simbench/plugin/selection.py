@@ -7,7 +7,7 @@ import pytest
 
 from pytest_simbench.cli.interpreters import checked_specification, interpreter_path
 from pytest_simbench.cli.names import install_missing, progress, read_names
-from pytest_simbench.cli.selection import EVERY, MODES, Selection, check, robots_of
+from pytest_simbench.cli.selection import EVERY, MODES, Selection, check, profiles_of, robots_of
 from pytest_simbench.cli.values import BadInput, shown
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.plugin import cluster, options
@@ -57,11 +57,12 @@ def parse(config: pytest.Config) -> Selection:
         for name, text in options.value(config, "sim_spec").items()
     }
     everything = registry.known() if not names or EVERY in asked else []
+    profiles, files = profiles_of(options.value(config, "sim_profile"))
     gui, headless = options.value(config, "sim_gui"), options.value(config, "sim_headless")
     return Selection(
         tuple(dict.fromkeys([*everything, *names])),
         (MODES if headless else ("gui",)) if gui else ("headless",),
-        options.value(config, "sim_profile"),
+        profiles,
         changes,
         {**builds, **pythons},
         specs,
@@ -69,6 +70,7 @@ def parse(config: pytest.Config) -> Selection:
         cluster.nodes(config),
         options.value(config, "sim_sweep"),
         tuple(names),
+        files,
     )
 
 

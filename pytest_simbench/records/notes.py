@@ -21,6 +21,7 @@ class Notes:
         left_out: why its details are not there.
         own_timestep: the time step that its profile has [s], where a sweep took another one.
         chosen_on: by what its settings were chosen.
+        profile_file: the file that its profile is of, as it was given.
         sample: the measured motion that it was held against.
         reading: of a law: measured, right, and the tolerance.
         lost_nodes: machines of a cluster that were lost with it before, and how.
@@ -35,6 +36,7 @@ class Notes:
     left_out: str = ""
     own_timestep: float | None = None
     chosen_on: tuple[Seen, ...] = ()
+    profile_file: str = ""
     sample: Sample | None = None
     reading: Reading | None = None
     lost_nodes: tuple[str, ...] = ()

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
+from pytest_simbench.simulator.ranges import EACH, Log
 
 
 @dataclass(frozen=True)
@@ -24,13 +25,13 @@ class DARTSettings(Settings):
         split_impulse: correct penetrations by a velocity of their own.
     """
 
-    timestep: float = 0.001
-    detector: Literal["fcl", "ode", "bullet", "dart"] = "fcl"
-    solver: Literal["dantzig", "pgs", "nsgs"] = "dantzig"
-    sweeps: int = 100
-    tolerance: float = 1e-5
+    timestep: Annotated[float, Log(5e-4, 0.005)] = 0.001
+    detector: Annotated[Literal["fcl", "ode", "bullet", "dart"], EACH] = "fcl"
+    solver: Annotated[Literal["dantzig", "pgs", "nsgs"], EACH] = "dantzig"
+    sweeps: Annotated[int, Log(5, 300, when=("solver", "pgs", "nsgs"))] = 100
+    tolerance: Annotated[float, Log(1e-6, 0.01, when=("solver", "pgs", "nsgs"))] = 1e-5
     sleeping: bool = True
-    split_impulse: bool = False
+    split_impulse: Annotated[bool, EACH] = False
 
 
 TUNED = DARTSettings(detector="ode", solver="nsgs", tolerance=5e-5)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
+from pytest_simbench.simulator.ranges import EACH, Linear, Log
+
+LAGGED = ("approximation", "similar", "lagged")
 
 
 @dataclass(frozen=True)
@@ -29,18 +32,18 @@ class DrakeSettings(Settings):
         shrink: what a free box with corner spheres loses on each face [m].
     """
 
-    timestep: float = 0.001
+    timestep: Annotated[float, Log(5e-4, 0.01)] = 0.001
     contact_model: Literal["point", "hydroelastic", "hydroelastic_with_fallback"] = (
         "hydroelastic_with_fallback"
     )
-    approximation: Literal["sap", "similar", "lagged"] = "lagged"
-    near_rigid_threshold: float = 1.0
-    stiction_tolerance: float = 1e-4
+    approximation: Annotated[Literal["sap", "similar", "lagged"], EACH] = "lagged"
+    near_rigid_threshold: Annotated[float, Linear(0, 1)] = 1.0
+    stiction_tolerance: Annotated[float, Log(1e-5, 0.01, when=LAGGED)] = 1e-4
     compliance: Literal["undefined", "rigid", "compliant"] = "undefined"
     hydroelastic_modulus: float = 1e7
-    point_stiffness: float = 1e6
-    hunt_crossley_dissipation: float = 50.0
-    relaxation_time: float = 0.1
+    point_stiffness: Annotated[float, Log(1e4, 1e8)] = 1e6
+    hunt_crossley_dissipation: Annotated[float, Log(1, 200, when=LAGGED)] = 50.0
+    relaxation_time: Annotated[float, Log(1e-3, 0.5, when=("approximation", "sap"))] = 0.1
     corner_radius: float = 0.0
     pad_radius: float = 0.0
     shrink: float = 0.0

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from pytest_simbench.simulator import Seen, Settings
+from pytest_simbench.simulator.ranges import EACH, Each, Linear, Log
+
+DARTSIM = Each(("engine", "dartsim"))
 
 
 @dataclass(frozen=True)
@@ -25,11 +28,11 @@ class GazeboSettings(Settings):
             so nothing can be turned on the ground. dartsim has none.
     """
 
-    timestep: float = 0.001
-    engine: Literal["dartsim", "bullet-featherstone"] = "dartsim"
-    detector: Literal["ode", "fcl", "bullet", "dart"] = "ode"
-    solver: Literal["dantzig", "pgs"] = "dantzig"
-    position_gain: float = 0.1
+    timestep: Annotated[float, Log(5e-4, 0.005)] = 0.001
+    engine: Annotated[Literal["dartsim", "bullet-featherstone"], EACH] = "dartsim"
+    detector: Annotated[Literal["ode", "fcl", "bullet", "dart"], DARTSIM] = "ode"
+    solver: Annotated[Literal["dantzig", "pgs"], DARTSIM] = "dantzig"
+    position_gain: Annotated[float, Linear(0.05, 1)] = 0.1
     torsional_friction: float = 1.0
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
+from pytest_simbench.simulator.ranges import EACH, Linear, Log
 
 
 @dataclass(frozen=True)
@@ -32,19 +33,22 @@ class GenesisSettings(Settings):
         gjk: collide other convex shapes by GJK instead of MPR.
     """
 
-    timestep: float = 0.01
-    substeps: int = 1
+    timestep: Annotated[float, Log(1e-3, 0.01)] = 0.01
+    substeps: Annotated[int, Linear(1, 4)] = 1
     precision: Literal["32", "64"] = "32"
     integrator: Literal["approximate_implicitfast", "implicitfast", "Euler"] = (
         "approximate_implicitfast"
     )
-    friction_cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    impratio: float = 0.0
-    constraint_timeconst: float = 0.01
-    impedance: tuple[float, float] = (0.9, 0.95)
-    iterations: int = 50
+    friction_cone: Annotated[Literal["pyramidal", "elliptic"], EACH] = "pyramidal"
+    impratio: Annotated[float, Log(1, 100)] = 0.0
+    constraint_timeconst: Annotated[float, Log(0.002, 0.05)] = 0.01
+    impedance: tuple[Annotated[float, Linear(0.5, 0.99)], Annotated[float, Linear(0.9, 0.9999)]] = (
+        0.9,
+        0.95,
+    )
+    iterations: Annotated[int, Log(5, 200)] = 50
     tolerance: float = 0.0
-    noslip_iterations: int = 0
+    noslip_iterations: Annotated[int, Linear(0, 20, when=("friction_cone", "pyramidal"))] = 0
     box_box_detection: bool = False
     gjk: bool = False
 

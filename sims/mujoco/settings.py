@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
+from pytest_simbench.simulator.ranges import EACH, Linear, Log
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,8 @@ class MuJoCoSettings(Settings):
         timestep: [s]; MuJoCo's default is 0.002.
         integrator: `implicitfast` is what MuJoCo's documentation recommends where actuators have
             damping; the engine's default, Euler, treats theirs explicitly.
+        solver: of the constraints.
+        iterations: of it, at most.
         cone: friction cone.
         impratio: ratio of friction to normal constraint impedance.
         condim: dimension of the contact space: 3 sliding, 4 with torsional friction.
@@ -25,14 +28,20 @@ class MuJoCoSettings(Settings):
         noslip_iterations: of the friction post-processing.
     """
 
-    timestep: float = 0.002
+    timestep: Annotated[float, Log(5e-4, 0.01)] = 0.002
     integrator: Literal["Euler", "implicit", "implicitfast", "RK4"] = "implicitfast"
-    cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    impratio: float = 1.0
+    solver: Annotated[Literal["PGS", "CG", "Newton"], EACH] = "Newton"
+    iterations: Annotated[int, Log(5, 200)] = 100
+    cone: Annotated[Literal["pyramidal", "elliptic"], EACH] = "pyramidal"
+    impratio: Annotated[float, Log(1, 100)] = 1.0
     condim: Literal[3, 4, 6] = 3
-    solref: tuple[float, float] = (0.02, 1.0)
-    solimp: tuple[float, float, float] = (0.9, 0.95, 0.001)
-    noslip_iterations: int = 0
+    solref: tuple[Annotated[float, Log(0.001, 0.05)], Annotated[float, Log(0.5, 4)]] = (0.02, 1.0)
+    solimp: tuple[
+        Annotated[float, Linear(0.5, 0.999)],
+        Annotated[float, Linear(0.9, 0.9999)],
+        Annotated[float, Log(1e-4, 0.01)],
+    ] = (0.9, 0.95, 0.001)
+    noslip_iterations: Annotated[int, Linear(0, 20)] = 0
 
 
 @dataclass(frozen=True)
@@ -43,7 +52,7 @@ class FileSettings(Settings):
         timestep: replaces the file's [s].
     """
 
-    timestep: float = 0.002
+    timestep: Annotated[float, Log(5e-4, 0.01)] = 0.002
 
 
 TUNED = MuJoCoSettings(

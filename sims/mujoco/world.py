@@ -83,6 +83,8 @@ def _set_options(spec: Any, scene: Scene, settings: MuJoCoSettings) -> None:
     option = spec.option
     option.timestep = settings.timestep
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
+    option.solver = getattr(mujoco.mjtSolver, f"mjSOL_{settings.solver.upper()}")
+    option.iterations = settings.iterations
     option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     option.impratio = settings.impratio
     option.noslip_iterations = settings.noslip_iterations

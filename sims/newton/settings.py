@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from pytest_simbench.simulator import Seen, Settings
+from pytest_simbench.simulator.ranges import EACH, Linear, Log
 
 from ..mujoco.settings import FileSettings
 
@@ -18,6 +19,8 @@ class NewtonSettings(Settings):
     Attributes:
         timestep: [s]; Newton's examples of SolverMuJoCo mostly take 1/60 s in 10 substeps.
         integrator: of MuJoCo; Newton's default is `implicitfast`.
+        solver: of the constraints.
+        iterations: of it, at most.
         cone: friction cone.
         impratio: ratio of friction to normal constraint impedance.
         condim: dimension of the contact space: 3 sliding, 4 with torsional friction.
@@ -28,14 +31,20 @@ class NewtonSettings(Settings):
         gap: distance within which contacts are looked for [m]; Newton's default is 0.1.
     """
 
-    timestep: float = 1 / 600
+    timestep: Annotated[float, Log(5e-4, 0.005)] = 1 / 600
     integrator: Literal["euler", "implicit", "implicitfast", "rk4"] = "implicitfast"
-    cone: Literal["pyramidal", "elliptic"] = "pyramidal"
-    impratio: float = 1.0
+    solver: Annotated[Literal["CG", "Newton"], EACH] = "Newton"
+    iterations: Annotated[int, Log(5, 200)] = 100
+    cone: Annotated[Literal["pyramidal", "elliptic"], EACH] = "pyramidal"
+    impratio: Annotated[float, Log(1, 100)] = 1.0
     condim: Literal[3, 4, 6] = 3
-    ke: float = 2500.0
-    kd: float = 100.0
-    solimp: tuple[float, float, float] = (0.9, 0.95, 0.001)
+    ke: Annotated[float, Log(1e3, 1e6)] = 2500.0
+    kd: Annotated[float, Log(30, 3000)] = 100.0
+    solimp: tuple[
+        Annotated[float, Linear(0.5, 0.999)],
+        Annotated[float, Linear(0.9, 0.9999)],
+        Annotated[float, Log(1e-4, 0.01)],
+    ] = (0.9, 0.95, 0.001)
     gap: float = 0.1
 
 

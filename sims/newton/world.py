@@ -67,6 +67,8 @@ def make_solver(model: Any, prepared: PreparedRobot | None, settings: NewtonSett
     )
     options = solver.mj_model.opt
     options.timestep = settings.timestep
+    options.solver = getattr(mujoco.mjtSolver, f"mjSOL_{settings.solver.upper()}")
+    options.iterations = settings.iterations
     # On a state that is not finite MuJoCo would start over from its initial state, silently.
     options.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     # Couplings, loops and the friction of joints, as stiff as the step allows.

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
+from pytest_simbench.simulator.ranges import EACH, Linear, Log
 
 from .drives import Drive
 
@@ -29,15 +30,15 @@ class ODESettings(Settings):
         sleeping: whether boxes at rest for 1 s (0.01 m/s, 0.01 rad/s) are left out.
     """
 
-    timestep: float = 0.016
-    solver: Literal["step", "quickstep"] = "step"
-    iterations: int = 20
+    timestep: Annotated[float, Log(5e-4, 0.016)] = 0.016
+    solver: Annotated[Literal["step", "quickstep"], EACH] = "step"
+    iterations: Annotated[int, Log(5, 200, when=("solver", "quickstep"))] = 20
     erp: float = 0.2
     cfm: float = 1e-5
-    contact_erp: float = 0.2
-    contact_cfm: float = 1e-3
-    contacts: int = 10
-    friction: Literal["pyramid", "slip"] = "pyramid"
+    contact_erp: Annotated[float, Linear(0.05, 0.9)] = 0.2
+    contact_cfm: Annotated[float, Log(1e-8, 0.01)] = 1e-3
+    contacts: Annotated[int, Linear(3, 10)] = 10
+    friction: Annotated[Literal["pyramid", "slip"], EACH] = "pyramid"
     drive: Drive = "velocity"
     position_gain: float = 10.0
     sleeping: bool = True

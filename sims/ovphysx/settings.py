@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
+from pytest_simbench.simulator.ranges import EACH, Linear, Log
 
 
 @dataclass(frozen=True)
@@ -36,21 +37,21 @@ class OvPhysXSettings(Settings):
             computes the same bits, five times as slowly in a scene this small.
     """
 
-    timestep: float = 1.0 / 60.0
-    solver: Literal["TGS", "PGS"] = "TGS"
-    body_iterations: int = 16
-    arm_iterations: int = 32
-    velocity_iterations: int = 1
+    timestep: Annotated[float, Log(1e-3, 0.01)] = 1.0 / 60.0
+    solver: Annotated[Literal["TGS", "PGS"], EACH] = "TGS"
+    body_iterations: Annotated[int, Log(1, 64)] = 16
+    arm_iterations: Annotated[int, Log(1, 64)] = 32
+    velocity_iterations: Annotated[int, Linear(0, 8)] = 1
     linear_damping: float = 0.0
     angular_damping: float = 0.05
     sleeping: bool = True
-    max_depenetration_velocity: float = 3.0
-    contact_offset: float | None = None
+    max_depenetration_velocity: Annotated[float, Log(0.05, 10)] = 3.0
+    contact_offset: Annotated[float | None, Log(1e-3, 0.02)] = None
     rest_offset: float | None = None
     friction_offset_threshold: float = 0.04
     friction_correlation_distance: float = 0.025
-    forces_every_iteration: bool = True
-    contact_last: bool = False
+    forces_every_iteration: Annotated[bool, EACH] = True
+    contact_last: Annotated[bool, EACH] = False
     threads: int = 0
 
 

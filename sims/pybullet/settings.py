@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
+from pytest_simbench.simulator.ranges import EACH, Linear, Log
 
 
 @dataclass(frozen=True)
@@ -28,18 +30,18 @@ class PyBulletSettings(Settings):
         ordered_pairs: sort the overlapping pairs before each step.
     """
 
-    timestep: float = 1.0 / 240.0
-    solver_iterations: int = 50
+    timestep: Annotated[float, Log(5e-4, 0.01)] = 1.0 / 240.0
+    solver_iterations: Annotated[int, Log(10, 300)] = 50
     solver_residual: float = 1e-7
-    position_gain: float = 0.1
+    position_gain: Annotated[float, Linear(0.05, 1)] = 0.1
     velocity_gain: float = 1.0
     linear_damping: float = 0.04
     angular_damping: float = 0.04
-    contact_erp: float = 0.08
-    friction_erp: float = 0.2
-    cone_friction: bool = True
+    contact_erp: Annotated[float, Linear(0.02, 0.9)] = 0.08
+    friction_erp: Annotated[float, Linear(0.02, 0.9, when=("friction_anchor", True))] = 0.2
+    cone_friction: Annotated[bool, EACH] = True
     spinning_friction: float = 0.0
-    friction_anchor: bool = False
+    friction_anchor: Annotated[bool, EACH] = False
     sleeping: bool = False
     ordered_pairs: bool = False
 

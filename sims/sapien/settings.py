@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
+from pytest_simbench.simulator.ranges import EACH, Linear, Log
 
 
 @dataclass(frozen=True)
@@ -32,15 +33,15 @@ class SAPIENSettings(Settings):
         coupling_stiffness: of the tendons that couple joints [N m/rad, N/m].
     """
 
-    timestep: float = 0.01
-    position_iterations: int = 10
-    velocity_iterations: int = 1
-    tgs: bool = True
-    pcm: bool = True
-    friction_every_iteration: bool = True
+    timestep: Annotated[float, Log(1e-3, 0.01)] = 0.01
+    position_iterations: Annotated[int, Log(1, 50)] = 10
+    velocity_iterations: Annotated[int, Linear(0, 8)] = 1
+    tgs: Annotated[bool, EACH] = True
+    pcm: Annotated[bool, EACH] = True
+    friction_every_iteration: Annotated[bool, EACH] = True
     enhanced_determinism: bool = False
     bounce_threshold: float = 2.0
-    contact_offset: float = 0.01
+    contact_offset: Annotated[float, Log(1e-3, 0.02)] = 0.01
     sleep_threshold: float = 0.005
     angular_damping: float = 0.05
     link_damping: float = 0.05

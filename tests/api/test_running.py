@@ -254,3 +254,21 @@ def test_pytest_compares_with_it(pytester: pytest.Pytester) -> None:
     same = [simbench.load(name).contents.records[0].to_dict() for name in ("before", "now")]
     differ = {key for key in same[0] if same[0][key] != same[1][key]}
     assert differ <= {"test", "function", "seconds", "stepping", "timeline", "resources", "notes"}
+
+
+def test_a_profile_of_a_file_goes_wherever_a_name_does(
+    scripted: dict[str, Any], tmp_path: Path
+) -> None:
+    (tmp_path / "quick.toml").write_text('simulator = "mujoco"\n[settings]\ntimestep = 0.004\n')
+    run = simbench.run(Falling(), TWO, 1, profile="quick.toml,tuned")
+    names = [r.name for r in run.contents.records]
+    (label,) = (r.profile for r in run.contents.records if r.settings["timestep"] == 0.004)
+    assert label.startswith("quick-")
+    assert names == [
+        f"test_falling[mujoco-headless-{label}]",
+        "test_falling[mujoco-headless]",
+        "test_falling[pybullet-headless]",
+    ]
+    assert "quick.toml is a profile of mujoco, not of pybullet" in " ".join(run.problems)
+    with pytest.raises(simbench.BadInput, match="cannot read the profile no.toml: No such file"):
+        simbench.run(Falling(), "mujoco", profile="no.toml")

@@ -202,3 +202,12 @@ def test_a_reader_that_ends_early_is_no_fault(tmp_path: Path) -> None:
     environment = {**os.environ, "SIMBENCH_ENVIRONMENTS": str(tmp_path)}
     found = subprocess.run(command, shell=True, capture_output=True, text=True, env=environment)
     assert found.stderr == ""
+
+
+def test_settings_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "--settings", "mujoco"]) == 0
+    told = capsys.readouterr().out
+    assert "solref             0.02/1 " in told
+    assert "0.001 to 0.05 log, 0.5 to 4 log " in told
+    assert main(["list", "--settings", "mujoko"]) == 2
+    assert "unknown simulator 'mujoko'; choose from " in capsys.readouterr().err

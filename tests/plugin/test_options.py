@@ -215,3 +215,20 @@ def test_informational_commands(pytester: pytest.Pytester, command: str) -> None
     result = pytester.runpytest_subprocess(*command.split())
     assert result.ret == 0
     assert "Traceback (" not in result.stdout.str() + result.stderr.str()
+
+
+def test_a_profile_of_a_file(configure: Configure, pytester: pytest.Pytester) -> None:
+    text = 'simulator = "mujoco"\n[settings]\ntimestep = 0.004\n'
+    pytester.makefile(".toml", quick=text, wrong=text.replace("mujoco", "mujoko"))
+    selection = select(configure("--sim-profile=quick.toml,tuned", "--sim=mujoco"))
+    label, tuned = selection.profiles
+    assert (label[:6], tuned) == ("quick-", "tuned")
+    assert selection.settings("mujoco", label).timestep == 0.004
+    for words, message in (
+        ("--sim-profile=quick.toml --sim=drake", "quick.toml is a profile of mujoco, not of drake"),
+        ("--sim-profile=wrong.toml", "wrong.toml: unknown simulator 'mujoko'; choose from "),
+        ("--sim-profile=no.toml", "cannot read the profile no.toml: No such file"),
+        ("--sim-profile=best", "no simulator has .* 'best'; choose from .*, or give a file that"),
+    ):
+        with pytest.raises(pytest.UsageError, match=message):
+            select(configure(*words.split()))

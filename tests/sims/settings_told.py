@@ -34,6 +34,8 @@ def of_mujoco(model: Any) -> Told:
     return {
         "timestep": model.opt.timestep,
         "integrator": mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_"),
+        "solver": mujoco.mjtSolver(model.opt.solver).name.removeprefix("mjSOL_"),
+        "iterations": model.opt.iterations,
         "cone": mujoco.mjtCone(model.opt.cone).name.removeprefix("mjCONE_"),
         "impratio": model.opt.impratio,
         "noslip_iterations": model.opt.noslip_iterations,

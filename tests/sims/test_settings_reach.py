@@ -59,8 +59,8 @@ SECONDS = 3.0
 """Of motion: after two of rest Bullet has bodies sleep [s]."""
 
 MUJOCO = {
-    "timestep": 0.003, "integrator": "implicit", "cone": "elliptic", "impratio": 3.0, "condim": 4,
-    "solimp": (0.8, 0.85, 0.003),
+    "timestep": 0.003, "integrator": "implicit", "solver": "CG", "iterations": 33,
+    "cone": "elliptic", "impratio": 3.0, "condim": 4, "solimp": (0.8, 0.85, 0.003),
 }  # fmt: skip
 
 TOLD: dict[str, tuple[Changes, ...]] = {

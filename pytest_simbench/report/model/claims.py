@@ -222,7 +222,7 @@ def command(record: Record) -> str:
         f"--sim-name={record.simulator}",
         f"--sim-seed={record.seed}",
         "--sim-reps=1",
-        f"--sim-profile={record.profile}",
+        f"--sim-profile={record.notes.profile_file or record.profile}",
         f"--sim-protocol={record.protocol}",
         f"--sim-jitter={record.jitter:g}",
         *[f"--sim-robot={record.robot.get('name')}"] * bool(record.robot),

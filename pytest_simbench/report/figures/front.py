@@ -1,0 +1,29 @@
+"""The picture of a search over settings: cost and error of candidates, and their front."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+Point = tuple[float, float]
+"""Cost and error."""
+
+
+def draw(
+    points: Sequence[Point], front: Sequence[Point], today: Point, cost: str, unit: str
+) -> Any:
+    """A `matplotlib.figure.Figure`, within `figures.drawing`."""
+    from matplotlib.figure import Figure
+
+    figure: Any = Figure(figsize=(6.0, 4.0), layout="constrained")
+    axis = figure.subplots()
+    axis.scatter(*zip(*points, strict=True), s=12, color="0.7", label="candidates")
+    axis.step(*zip(*front, strict=True), where="post", marker="o", ms=4, label="front")
+    axis.plot(*today, "D", color="#d55e00", label="today's settings")
+    axis.set_xscale("log")
+    axis.set_yscale("symlog", linthresh=max(0.01, min(error for _, error in points)))
+    axis.set_xlabel(cost)
+    axis.set_ylabel(f"error [{unit}]" if unit else "error")
+    axis.grid(alpha=0.4)
+    axis.legend()
+    return figure

@@ -1,0 +1,152 @@
+"""Which candidate is recommended, and the verdict on the half that it was not chosen on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pytest_simbench.measure.intervals import Interval, betting, proportion, skewed_t
+from pytest_simbench.records.metrics import significant
+from pytest_simbench.tuning.target import Look, Target
+from pytest_simbench.tuning.trials import Candidate, Trials, least_costs
+
+SHARE_MARGIN = 0.05
+"""Of shares and of yes or no: 5 points more errors are not worse."""
+
+MARGIN = 0.1
+"""Of other errors: a tenth more is not worse. A law that is kept is right, however well."""
+
+DEARER = 2.0
+"""Times today's cost that the recommended point may have."""
+
+WORTH = 0.95
+"""A cost of more than this of today's is no gain."""
+
+SEEDS = 72
+"""Seeds without a loss that bound it below 5 points, with an error of 2.5 %; the other 2.5 % are
+for the bets."""
+
+
+def allowed(target: Target, error: float) -> float:
+    """The error up to which a candidate is not worse than one with this error."""
+    if target.metric is None:
+        return max(1.0, (1 + MARGIN) * error)
+    return error + (SHARE_MARGIN if target.metric.bounded else MARGIN * error)
+
+
+def recommended(done: Sequence[Candidate], trials: Trials) -> tuple[Candidate, str]:
+    """The candidate to take, today's if it is that, and why."""
+    today, target = done[0], trials.target
+    within = [c for c in done if not c.ended and c.cost() <= DEARER * today.cost()]
+    best = min(map(trials.error, within))
+    limit = allowed(target, best)
+    right = [c for c in within if trials.error(c) <= limit]
+    found = min(right, key=lambda c: c.cost())
+    keeps = trials.error(today) <= limit
+    if found is today or (keeps and found.cost() > WORTH * today.cost()):
+        return today, "no cheaper candidate has an error that is not worse"
+    error = significant(best)
+    return found, (
+        f"the cheapest of {len(right)} whose error is not worse than the least, {error}, that "
+        f"{DEARER:g} times today's cost buy (margin: up to {significant(limit)})"
+    )
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What the held-out half says of a candidate beside today's settings.
+
+    Attributes:
+        verdict: `better`, `not worse`, `worse` or `not shown`.
+        looks: laws or seeds behind it.
+        before, after: errors.
+        worse_by: by how much the error is larger, with its interval; None of laws.
+        cheaper: today's cost over the candidate's, with its interval; None where too few.
+        reason: of the verdict.
+    """
+
+    verdict: str
+    looks: int
+    before: float
+    after: float
+    worse_by: Interval | None
+    cheaper: Interval | None
+    reason: str
+
+
+def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
+    """The verdict from the looks that both have had on the held-out half."""
+    looks = [look for look in target.judged if look in today.errors and look in found.errors]
+    if target.metric is None:
+        looks = [look for look in looks if look.number == 1]
+    pairs = [(today.errors[look], found.errors[look]) for look in looks]
+    before = target.together({look: today.errors[look] for look in looks})
+    after = target.together({look: found.errors[look] for look in looks})
+    old, new = least_costs(today.costs), least_costs(found.costs)
+    costs = [
+        math.log(old[look] / new[look])
+        for look in looks
+        if min(old.get(look, 0.0), new.get(look, 0.0)) > 0
+    ]
+    cheaper = None
+    if len(costs) >= 3 and max(costs) > min(costs):
+        of = skewed_t(costs)
+        mean, low, high = (math.exp(value) for value in (of.mean, of.low, of.high))
+        cheaper = Interval(mean, low, high, of.n, of.method)
+    if target.metric is None:
+        verdict, reason = _of_laws(target, looks, today, found)
+        return Judgement(verdict, len(looks), before, after, None, cheaper, reason)
+    more = [b - a for a, b in pairs]
+    bound = _difference(more, target.metric.bounded)
+    margin = allowed(target, before) - before
+    verdict, reason = _of_seeds(bound, margin, more)
+    return Judgement(verdict, len(looks), before, after, bound, cheaper, reason)
+
+
+def _of_laws(
+    target: Target, looks: Sequence[Look], today: Candidate, found: Candidate
+) -> tuple[str, str]:
+    """Laws draw nothing, so there is no interval: each one is held against itself."""
+    worse = {
+        look.task.name: found.errors[look] / today.errors[look]
+        for look in looks
+        if found.errors[look] > allowed(target, today.errors[look])
+    }
+    if worse:
+        name = max(worse, key=lambda key: worse[key])
+        return "worse", (
+            f"{len(worse)} of {len(looks)} laws at other parameters, {name} "
+            f"{significant(worse[name])} times"
+        )
+    better = any(today.errors[look] > allowed(target, found.errors[look]) for look in looks)
+    verdict = "better" if better else "not worse"
+    return verdict, (
+        f"each of {len(looks)} laws at other parameters is kept, or broken by at most "
+        f"{100 * MARGIN:.0f} % more than today"
+    )
+
+
+def _difference(more: Sequence[float], bounded: bool) -> Interval:
+    """By how much errors are larger, for each seed. Of proportions the upper end is the lower of
+    two, each wrong in 2.5 % at most: that of bets, and how often a seed can be worse at all."""
+    n, mean = len(more), sum(more) / len(more)
+    if bounded:
+        bets = betting([(d + 1) / 2 for d in more])
+        losses = proportion(sum(d > 0 for d in more), n)
+        return Interval(mean, 2 * bets.low - 1, min(2 * bets.high - 1, losses.high), n, "betting")
+    if n < 3 or max(more) == min(more):
+        return Interval(mean, -math.inf, math.inf, n, "none")
+    return skewed_t(more)
+
+
+def _of_seeds(bound: Interval, margin: float, more: Sequence[float]) -> tuple[str, str]:
+    lost = sum(d > 0 for d in more)
+    told = f"worse in {lost} of {bound.n} seeds; margin {significant(margin)}"
+    if bound.high < 0:
+        return "better", told
+    if bound.high <= margin:
+        return "not worse", told
+    if bound.low > 0:
+        return "worse", told
+    return "not shown", f"{told}; too few seeds to tell (with no loss {SEEDS} are enough)"

@@ -1,0 +1,92 @@
+"""Which candidate is taken, and what the other half says of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_simbench.laws import LAWS
+from pytest_simbench.tuning.judging import SEEDS, allowed, judged, recommended
+from pytest_simbench.tuning.target import Look, Target
+from pytest_simbench.tuning.trials import Candidate
+
+from .made_up import target, trials
+
+LAW = Look(LAWS[0])
+
+
+def candidate(errors: list[float], cost: float, of: Target, half: str = "held_out") -> Candidate:
+    looks = of.judged if half else of.chosen
+    known = dict(zip(looks, errors, strict=True))
+    costs = {look: cost * (1 + k / 100) for k, look in enumerate(known)}
+    return Candidate("made up", {}, half, errors=known, costs=costs)
+
+
+@pytest.mark.parametrize(
+    ("points", "wanted"),
+    [
+        ([(1.0, 0.0), (0.5, 0.04), (0.3, 0.3)], 1),  # within five points
+        ([(1.0, 0.0), (0.97, 0.0)], 0),  # no gain
+        ([(1.0, 0.5), (0.5, 0.5), (1.5, 0.0), (3.0, 0.0)], 2),  # truer, for up to twice the cost
+        ([(1.0, 0.5), (9.0, 0.0)], 0),
+    ],
+)
+def test_the_cheapest_as_right_as_the_best(
+    tmp_path: Path, points: list[tuple[float, float]], wanted: int
+) -> None:
+    looks, _ = trials(tmp_path, lambda s, k: 1.0, target(2))
+    done = [candidate([error] * 2, cost, looks.target, "") for cost, error in points]
+    found, why = recommended(done, looks)
+    assert done.index(found) == wanted
+    assert why
+
+
+def test_margins() -> None:
+    of = target()
+    assert allowed(of, 0.2) == pytest.approx(0.25)
+    assert allowed(replace(of, metric=None), 0.5) == 1.0  # a law that is kept
+    assert allowed(replace(of, metric=None), 20.0) == pytest.approx(22.0)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "verdict"),
+    [
+        ([0.0] * SEEDS, [0.0] * SEEDS, "not worse"),
+        ([0.0] * (SEEDS - 1), [0.0] * (SEEDS - 1), "not shown"),  # one seed less
+        ([0.0] * SEEDS, [1.0] * 30 + [0.0] * (SEEDS - 30), "worse"),
+        ([1.0] * 30 + [0.0] * (SEEDS - 30), [0.0] * SEEDS, "better"),
+        ([0.0] * SEEDS, [1.0] * 3 + [0.0] * (SEEDS - 3), "not shown"),
+    ],
+)
+def test_verdicts_on_seeds(before: list[float], after: list[float], verdict: str) -> None:
+    of = target(1, len(before))
+    found = judged(candidate(before, 1.0, of), candidate(after, 0.5, of), of)
+    assert found.verdict == verdict
+    assert found.worse_by is not None
+    assert found.worse_by.low <= found.worse_by.mean <= found.worse_by.high
+
+
+def test_the_cost_is_told_with_its_interval() -> None:
+    of = target(1, 6)
+    old, new = candidate([0.0] * 6, 1.0, of), candidate([0.0] * 6, 0.5, of)
+    new.costs = {
+        look: cost * (1 + (k % 2) / 50) for k, (look, cost) in enumerate(new.costs.items())
+    }
+    cheaper = judged(old, new, of).cheaper
+    assert cheaper is not None
+    assert 1.9 < cheaper.low < cheaper.mean < cheaper.high < 2.1
+
+
+def test_a_law_is_held_against_itself() -> None:
+    two = Look(LAWS[0]), Look(LAWS[1])
+    of = Target("laws:x", "cpu_cost", two, two)
+
+    def verdict(before: Any, after: Any) -> str:
+        return judged(candidate(before, 1.0, of), candidate(after, 0.5, of), of).verdict
+
+    assert verdict([0.1, 8.0], [0.9, 8.5]) == "not worse"
+    assert verdict([0.1, 8.0], [1.2, 0.5]) == "worse"  # one is broken now, whatever the other
+    assert verdict([0.1, 8.0], [0.1, 0.5]) == "better"

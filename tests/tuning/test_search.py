@@ -1,0 +1,96 @@
+"""The search, with made-up repetitions."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.tuning.search import Search, front, space_of
+from pytest_simbench.tuning.target import TuningError
+
+from .made_up import MadeUp, Score, trials
+
+BASE = adapter("mujoco").profiles["default"]
+
+
+def score(settings: Any, number: int) -> float:
+    """Right up to 4 ms with the elliptic cone, and never with the pyramid."""
+    return float(settings["timestep"] <= 0.004 and settings["cone"] == "elliptic")
+
+
+def search(folder: Path, score: Score = score, seed: int = 1) -> tuple[Search, MadeUp]:
+    looks, executor = trials(folder, score)
+    space = space_of(BASE, ["timestep", "cone"], "mujoco")
+    return Search(looks, BASE, space, seed, lambda one, best: None), executor
+
+
+def test_it_finds_the_cheapest_that_is_right(tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    for seed in (1, 2, 3):
+        one, _ = search(tmp_path / str(seed), seed=seed)
+        best = front(one.run(1e9, 40), one.trials)
+        right = [c for c in best if one.trials.error(c) == 0]
+        assert right[0].changes["cone"] == "elliptic"
+        assert 0.0032 < right[0].changes["timestep"] <= 0.004
+        assert [c.cost() for c in best] == sorted(c.cost() for c in best)
+
+
+def test_it_goes_on_as_if_it_had_not_been_interrupted(tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    whole, _ = search(tmp_path / "whole")
+    wanted = [dict(c.changes) for c in whole.run(1e9, 12)]
+
+    def stops(settings: Any, number: int) -> float:
+        if len(first.asked) > 17:
+            raise KeyboardInterrupt
+        return score(settings, number)
+
+    part, first = search(tmp_path / "part", stops)
+    with pytest.raises(KeyboardInterrupt):
+        part.run(1e9, 12)
+    part.trials.folder.close()
+    rest, second = search(tmp_path / "part")
+    assert [dict(c.changes) for c in rest.run(1e9, 12)] == wanted
+    kept = first.asked[:-1]  # the last one was under way
+    assert not {*kept} & {*second.asked}
+
+
+def test_it_makes_no_more_trials_than_it_may(tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    one, executor = search(tmp_path)
+    one.run(1e9, 3)
+    assert {variant for variant, _ in executor.asked} <= {"today", "trial0", "trial1", "trial2"}
+
+
+def test_a_setting_that_does_not_act_is_not_asked_for(tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    base = adapter("drake").profiles["default"]
+    looks, _ = trials(tmp_path, lambda s, k: 1.0)
+    space = space_of(base, None, "drake")
+    one = Search(looks, base, space, 1, lambda one, best: None)
+    study = one._study(__import__("optuna"))
+    for _ in range(6):
+        asked = one._suggested(study.ask())
+        assert ("relaxation_time" in asked) == (asked["approximation"] == "sap")
+        assert ("stiction_tolerance" in asked) == (asked["approximation"] != "sap")
+
+
+def test_too_little_time(tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    with pytest.raises(TuningError, match="5 s are too few to search: .* took 4 s; give a"):
+        search(tmp_path)[0].run(5.0)
+
+
+def test_settings_that_cannot_be_searched() -> None:
+    with pytest.raises(TuningError, match="no setting 'condim' to search; choose from timestep, s"):
+        space_of(BASE, ["condim"], "mujoco")
+
+
+def test_without_optuna(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    with pytest.raises(TuningError, match=r"pip install 'pytest-simbench\[tune\]'"):
+        search(tmp_path)[0].run(1e9, 1)

@@ -1,0 +1,62 @@
+"""Looks at candidates: what is hopeless, what fails, and what is not repeated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.tuning.target import TuningError
+
+from .made_up import trials
+
+
+def test_cost_and_error_are_those_of_the_records(tmp_path: Path) -> None:
+    looks, executor = trials(tmp_path, lambda s, k: 0.5 if k == 1 else 1.0)
+    today = looks.today()
+    assert looks.error(today) == pytest.approx(0.125)
+    assert today.cost() == pytest.approx(0.005)
+    assert executor.asked == [("today", k) for k in (1, 2, 3, 4)]
+    seeds = [(r.seed, r.settings["timestep"]) for r in looks.folder.own]
+    assert seeds[0] == (300_001, 0.002)
+
+
+def test_a_hopeless_candidate_is_stopped(tmp_path: Path) -> None:
+    """Dearer than today's, and after a loss it cannot be as right."""
+    looks, executor = trials(tmp_path, lambda s, k: 1.0 if s["timestep"] == 0.002 else 0.5)
+    today = looks.today()
+    worse = looks.choose("trial1", {"timestep": 0.001}, [today])
+    assert worse.ended == "hopeless after 1 of 4"
+    cheaper = looks.choose("trial2", {"timestep": 0.004}, [today])
+    assert (cheaper.ended, looks.error(cheaper)) == ("", 0.5)  # it is on the front
+    assert executor.asked.count(("trial2", 4)) == 1
+
+
+def test_a_candidate_that_fails_is_stopped(tmp_path: Path) -> None:
+    looks, executor = trials(tmp_path, lambda s, k: 1.0 if s["timestep"] < 0.004 else None)
+    bad = looks.choose("trial1", {"timestep": 0.004}, [looks.today()])
+    assert bad.ended == "failed: WorkerHung in fall"
+    assert (looks.error(bad), bad.cost()) == (1.0, float("inf"))
+    assert executor.asked[4:] == [("trial1", 1)]
+
+
+def test_failures_that_today_has_too_end_nothing(tmp_path: Path) -> None:
+    looks, _ = trials(tmp_path, lambda s, k: None if k == 2 else 1.0)
+    found = looks.choose("trial1", {"timestep": 0.004}, [looks.today()])
+    assert (found.ended, looks.error(found)) == ("", 0.25)
+
+
+def test_what_is_recorded_is_not_repeated(tmp_path: Path) -> None:
+    looks, _ = trials(tmp_path, lambda s, k: 1.0)
+    looks.judge(looks.today(), looks=looks.target.judged)
+    looks.folder.close()
+    again, executor = trials(tmp_path, lambda s, k: 0.0)
+    today = again.today()
+    (judged,) = again.judge(today, looks=again.target.judged)
+    assert (again.error(today), again.error(judged), executor.asked) == (0.0, 0.0, [])
+
+
+def test_settings_that_never_work_cannot_be_judged(tmp_path: Path) -> None:
+    looks, _ = trials(tmp_path, lambda s, k: None)
+    with pytest.raises(TuningError, match="today's settings cannot be judged: it hangs"):
+        looks.today()
