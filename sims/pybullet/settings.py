@@ -17,7 +17,7 @@ class PyBulletSettings(Settings):
         timestep: [s]; 1/240 is what PyBullet's guide recommends to keep.
         solver_iterations: of the constraint solver.
         solver_residual: residual below which it stops earlier.
-        position_gain, velocity_gain: of the joint motors, see the module's docstring.
+        position_gain, velocity_gain: of the joint motors (drives.py); None: as the drive law says.
         linear_damping, angular_damping: of free bodies [1/s].
         contact_erp: share of a penetration that is corrected in a step.
         friction_erp: the same for friction anchors.
@@ -31,7 +31,7 @@ class PyBulletSettings(Settings):
     timestep: float = 1.0 / 240.0
     solver_iterations: int = 50
     solver_residual: float = 1e-7
-    position_gain: float = 0.1
+    position_gain: float | None = 0.1
     velocity_gain: float = 1.0
     linear_damping: float = 0.04
     angular_damping: float = 0.04
@@ -46,7 +46,7 @@ class PyBulletSettings(Settings):
 
 TUNED = PyBulletSettings(
     ordered_pairs=True,
-    position_gain=0.3,
+    position_gain=None,
     linear_damping=0.0,
     angular_damping=0.0,
     solver_residual=0.0,

@@ -49,6 +49,23 @@ def test_motors_keep_the_effort_limits(loaded: PyBullet) -> None:
     np.testing.assert_allclose(largest[:7], limits[:7], rtol=1e-6)
 
 
+@pytest.mark.parametrize("goal", ["near", "beyond the limits"])
+def test_motors_follow_the_drive_law(loaded: PyBullet, goal: str) -> None:
+    """Where their effort allows it, a step h brings joints to the velocity at which the drive law
+    asks for no effort at its end; of two fingers, the law at the mean of their set points."""
+    robot, step = loaded.scene.robot, loaded.settings.timestep
+    assert robot is not None
+    k, d, q = (robot.column(of) for of in ("stiffness", "damping", "initial_position"))
+    near, way = goal == "near", np.array([0.002] * 7 + [-0.001, -0.003])
+    told = q + (way if near else 9.0)
+    speed = 0.01 + (0 * q if near else k / d * (q - told))
+    loaded.command(told, speed, 0 * q)
+    loaded.step()
+    law = (k * (told - q) + d * speed) / (step * k + d)
+    law[7:] = law[7:].mean()
+    np.testing.assert_allclose(loaded.joint_state()[1], law, atol=1e-5)
+
+
 def test_default_is_what_the_engine_does_by_itself() -> None:
     """Tumbling boxes end bit for bit where an engine leaves them whose parameters nobody set."""
     import pybullet

@@ -147,7 +147,7 @@ def pybullet_bodies(**parameters: Any) -> Callable[[Any], None]:
 def pybullet_gains(position: float, velocity: float) -> Callable[[Any], None]:
     def set_(s: Any) -> None:
         n = len(s._joints)
-        s._gains = [position] * n, [velocity] * n
+        s._drives.gains = [position] * n, [velocity] * n
 
     return set_
 
