@@ -18,6 +18,7 @@ class PyBulletSettings(Settings):
         solver_iterations: of the constraint solver.
         solver_residual: residual below which it stops earlier.
         position_gain, velocity_gain: of the joint motors (drives.py); None: as the drive law says.
+        finger_gain: position gain of the fingers' motors.
         linear_damping, angular_damping: of free bodies [1/s].
         contact_erp: share of a penetration that is corrected in a step.
         friction_erp: the same for friction anchors.
@@ -32,6 +33,7 @@ class PyBulletSettings(Settings):
     solver_iterations: int = 50
     solver_residual: float = 1e-7
     position_gain: float | None = 0.1
+    finger_gain: float = 0.1
     velocity_gain: float = 1.0
     linear_damping: float = 0.04
     angular_damping: float = 0.04
@@ -47,6 +49,7 @@ class PyBulletSettings(Settings):
 TUNED = PyBulletSettings(
     ordered_pairs=True,
     position_gain=None,
+    finger_gain=0.3,
     linear_damping=0.0,
     angular_damping=0.0,
     solver_residual=0.0,
