@@ -49,7 +49,7 @@ class PyBulletSettings(Settings):
 TUNED = PyBulletSettings(
     ordered_pairs=True,
     position_gain=None,
-    finger_gain=0.3,
+    finger_gain=0.2,
     linear_damping=0.0,
     angular_damping=0.0,
     solver_residual=0.0,
