@@ -2,13 +2,13 @@
 limit.
 
 Each step h they ask for the velocity v + `velocityGain` (v* - v) + `positionGain` (q* - q) / h.
-Where no gain is set, the arm's are told what makes it that at which the scene's drive law
+Where no gain is set they are told what makes it that at which the scene's drive law
 (`scene.Joint`) asks for no effort at the end of the step, (k (q* - q) + d v*) / (h k + d): they are
 that law, infinitely stiff at the same k / d. A higher rate, as of a gain of 0.3 (72/s against
 k / d = 10/s), brakes too late once the effort saturates: joint 1 of the Panda goes 53 % of its way
 too far. Bullet clips q* to the joint's limits, which the law does not: v* makes up for it.
 
-Fingers have a gain of their own. Told apart, both motors must come to their limits before the gear
+Two fingers have a gain of their own. Told apart, both motors must come to their limits before the gear
 between them gets its way, and at the law's rate (25/s) 50 iterations bring them to 14 of 25 N: the
 fingers stay 16.5 mm apart.
 """
@@ -51,10 +51,11 @@ class Drives:
         n, step, gain = len(joints), settings.timestep, settings.position_gain
         k, d = robot.column("stiffness"), robot.column("damping")
         self._share = np.ones(n) if gain is not None else d / np.maximum(step * k + d, WEAKEST)
-        self._share[robot.finger_indices] = 1.0
+        coupled = robot.finger_indices if robot.gripper.couplings else []
+        self._share[coupled] = 1.0
         self._rate = (1 - self._share) / step
         gains = 1 - self._share if gain is None else np.full(n, gain)
-        gains[robot.finger_indices] = settings.finger_gain
+        gains[coupled] = settings.finger_gain
         self.gains = gains, np.full(n, settings.velocity_gain)
         infos = [pybullet.getJointInfo(number, joint, physicsClientId=client) for joint in joints]
         self._limits = np.array([info[8:10] for info in infos]).reshape(-1, 2).T
