@@ -8,9 +8,9 @@ that law, infinitely stiff at the same k / d. A higher rate, as of a gain of 0.3
 k / d = 10/s), brakes too late once the effort saturates: joint 1 of the Panda goes 53 % of its way
 too far. Bullet clips q* to the joint's limits, which the law does not: v* makes up for it.
 
-Two fingers have a gain of their own. Told apart, both motors must come to their limits before the gear
-between them gets its way, and at the law's rate (25/s) 50 iterations bring them to 14 of 25 N: the
-fingers stay 16.5 mm apart.
+Two fingers have a gain of their own. Told apart, both motors must come to their limits before the
+gear between them gets its way, and at the law's rate (25/s) 50 iterations bring them to 14 of 25 N:
+they stay 16.5 mm apart.
 """
 
 from __future__ import annotations
