@@ -1,10 +1,8 @@
 """PyBullet (Bullet 2.x), through its Python bindings.
 
-Drives are Bullet's own position motors: velocity constraints that ask, each step, for the velocity
-`velocityGain` (v* - v) + v* + `positionGain` (q* - q) / timestep, with the effort limit as largest
-force. They are not springs: there is no stiffness in N m/rad, and no effort feed-forward, which
-they do not need. The fingers' effort limit is the grip's squeeze. What joints do beside, and those
-that have a motor alone (`scene.Joint`): joints.py.
+Drives are Bullet's own position motors (drives.py). They are not springs: there is no stiffness in
+N m/rad, and no effort feed-forward, which they do not need. The fingers' effort limit is the grip's
+squeeze. What joints do beside, and those that have a motor alone (`scene.Joint`): joints.py.
 
 What was learnt stands in docs/engines/pybullet.md.
 """
@@ -34,6 +32,7 @@ from pytest_simbench.simulator import (
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from .anchors import Anchors
+from .drives import Drives
 from .joints import Pushed, couple, rub
 from .readback import ReadBack, wrench
 from .settings import CHOSEN_ON, PROFILES, PyBulletSettings
@@ -225,10 +224,8 @@ class PyBullet(Simulator):
             close_loop(c, self._robot, self._links, closure, frames(prepared, closure))
             for closure in reduced(prepared)
         ]
-        n = len(self._joints)
-        self._forces = [0.0 if joint.motor else joint.effort_limit for joint in robot.joints]
-        self._gains = ([self.settings.position_gain] * n, [self.settings.velocity_gain] * n)
-        self.command(robot.column("initial_position"), np.zeros(n), np.zeros(n))
+        self._drives = Drives(c, self._robot, self._joints, robot, self.settings)
+        self.command(robot.column("initial_position"), *np.zeros((2, len(robot.joints))))
 
     def read_back(self) -> dict[str, Any]:
         return ReadBack(self).all()
@@ -237,16 +234,7 @@ class PyBullet(Simulator):
         self._commanded = (position, velocity, effort)
         if self._pushed is not None:
             self._pushed.command(effort)
-        pybullet.setJointMotorControlArray(
-            self._robot,
-            self._joints,
-            pybullet.POSITION_CONTROL,
-            position,
-            velocity,
-            self._forces,
-            *self._gains,
-            physicsClientId=self.client,
-        )
+        self._drives.command(position, velocity)
 
     def push(self, wrenches: FloatArray) -> None:
         c = self.client

@@ -49,6 +49,20 @@ def test_motors_keep_the_effort_limits(loaded: PyBullet) -> None:
     np.testing.assert_allclose(largest[:7], limits[:7], rtol=1e-6)
 
 
+@pytest.mark.parametrize("way", [0.002, 9.0])
+def test_motors_follow_the_drive_law(loaded: PyBullet, way: float) -> None:
+    """In a step h whose efforts they have the arm's motors get to the velocity at which the drive
+    law asks for no effort at its end, also to a set point beyond the joints' limits."""
+    robot, step = SCENE.robot, loaded.settings.timestep
+    assert robot is not None
+    k, d, q = (robot.column(of) for of in ("stiffness", "damping", "initial_position"))
+    told, speed = q + way, 0.03 - k / d * way
+    loaded.command(told, speed, 0 * q)
+    loaded.step()
+    law = (k * (told - q) + d * speed) / (step * k + d)
+    np.testing.assert_allclose(loaded.joint_state()[1, :7], law[:7], atol=1e-5)
+
+
 def test_default_is_what_the_engine_does_by_itself() -> None:
     """Tumbling boxes end bit for bit where an engine leaves them whose parameters nobody set."""
     import pybullet

@@ -144,10 +144,9 @@ def pybullet_bodies(**parameters: Any) -> Callable[[Any], None]:
     return set_
 
 
-def pybullet_gains(position: float, velocity: float) -> Callable[[Any], None]:
+def pybullet_gains(arm: float, fingers: float, velocity: float) -> Callable[[Any], None]:
     def set_(s: Any) -> None:
-        n = len(s._joints)
-        s._gains = [position] * n, [velocity] * n
+        s._drives.gains = [arm] * 7 + [fingers] * 2, [velocity] * 9
 
     return set_
 
@@ -171,8 +170,9 @@ SET: dict[str, tuple[tuple[Changes, Changes, Callable[[Any], None]], ...]] = {
         ({}, {"linear_damping": 0.125}, pybullet_bodies(linearDamping=0.125)),
         ({}, {"angular_damping": 0.125}, pybullet_bodies(angularDamping=0.125)),
         ({}, {"sleeping": True}, pybullet_bodies(activationState=1)),
-        ({}, {"position_gain": 0.2}, pybullet_gains(0.2, 1.0)),
-        ({}, {"velocity_gain": 0.7}, pybullet_gains(0.1, 0.7)),
+        ({}, {"position_gain": 0.2}, pybullet_gains(0.2, 0.1, 1.0)),
+        ({}, {"finger_gain": 0.2}, pybullet_gains(0.1, 0.2, 1.0)),
+        ({}, {"velocity_gain": 0.7}, pybullet_gains(0.1, 0.1, 0.7)),
     ),
     "drake": (
         (
