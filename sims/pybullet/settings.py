@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
 from pytest_simbench.simulator.ranges import EACH, Linear, Log
@@ -46,6 +46,9 @@ class PyBulletSettings(Settings):
     friction_anchor: Annotated[bool, EACH] = False
     sleeping: bool = False
     ordered_pairs: bool = False
+
+    def quantities(self) -> Mapping[str, Any]:
+        return {"body/*/damping": (self.linear_damping, self.angular_damping)}
 
 
 TUNED = PyBulletSettings(

@@ -117,7 +117,7 @@ TOLD = {
         ("Drake and Genesis 2", 1000 * law("heavy_on_top", "drake")),
     ],
     "hold in a hand": [
-        ("86 mm in", 1000 * law("grip_holds", "pybullet")),
+        ("11 mm in", 1000 * law("grip_holds", "pybullet")),
         ("3 mm in DART", 1000 * law("grip_holds", "dart")),
     ],
     "free flight, tumbling": [
@@ -151,7 +151,7 @@ TOLD = {
         ),
     ],
     "push": [
-        ("0.8 mm off after", 1000 * mean("pushing", "position_error", **CURVE, simulator="dart")),
+        ("0.7 mm off after", 1000 * mean("pushing", "position_error", **CURVE, simulator="dart")),
         ("ODE ends 88 mm", 1000 * mean("pushing", "position_error", **CURVE, simulator="ode")),
         ("turns 114 degrees", degrees(law("push_turns", "ovphysx", "value"))),
         ("not 52", degrees(law("push_turns", "ovphysx", "exact"))),

@@ -14,7 +14,7 @@ import pytest
 from pytest_simbench.simulator.registry import adapter, registered
 
 PUBLISHED = {
-    "dart": {"default": "66deefbc", "tuned": "a4fc61ec", "real": "a4fc61ec"},
+    "dart": {"default": "898a4638", "tuned": "43e82ad0", "real": "43e82ad0"},
     "drake": {"default": "09441a8f", "tuned": "cf3c33e5", "real": "d8e9fec8"},
     "gazebo": {"default": "3def4e2e", "tuned": "93d12aae"},
     "genesis": {
@@ -37,7 +37,7 @@ PUBLISHED = {
     },
     "ode": {"default": "f1f2c655", "tuned": "7c840eea", "real": "85bf7f2e"},
     "ovphysx": {"default": "0791bbcb", "tuned": "d65af419", "real": "e9c2722b"},
-    "pybullet": {"default": "4aa77342", "tuned": "aae95f40", "real": "4c560c5f"},
+    "pybullet": {"default": "2ff35d9e", "tuned": "2684c5fd", "real": "a214713d"},
     "sapien": {"default": "67451d2d", "tuned": "c57855c2", "real": "72f5c933"},
 }
 
