@@ -13,6 +13,7 @@ from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
+from threading import Lock
 from typing import Any, ClassVar
 
 import numpy as np
@@ -257,13 +258,23 @@ def name_of(policy: Any) -> str:
     return str(named or type(policy).__name__)
 
 
+_PARSING = Lock()
+"""To find a class in its file means to parse it, which fails in two threads at once (CPython issue
+106905): one of 1400 pushes side by side ended so."""
+
+
+@lru_cache(256)
+def _source(made: Any) -> str:
+    return inspect.getsource(made)
+
+
 def digest(policy: Any) -> str:
     """Of a policy's source and of the numbers and texts that it holds; others (the weights of a
     network, for instance) do not count."""
     text = [name_of(policy)]
     made = policy._act if isinstance(policy, Function) else policy
-    with suppress(OSError, TypeError):
-        text.append(inspect.getsource(made if inspect.isroutine(made) else type(made)))
+    with suppress(OSError, TypeError), _PARSING:
+        text.append(_source(made if inspect.isroutine(made) else type(made)))
     for name, value in sorted(getattr(policy, "__dict__", {}).items()):
         if isinstance(value, int | float | str | list | tuple | dict | np.ndarray):
             text.append(f"{name}={value!r}")
