@@ -167,14 +167,17 @@ class Connection:
 
     def take(self, timeout: float) -> Any:
         """The next message, where it may be a question: bytes, through `exchange` if there is one;
-        errors as `receive`."""
-        if self.exchange is None or not self._inbox.empty():
+        errors as `receive`. There stands the mark that no question follows, even where the answer
+        is here already: left unread, it would come before the next loop's first question."""
+        if self.exchange is None:
             return self.receive(timeout)
         self.exchange.settimeout(timeout)
         try:
             found = framed(self.exchange)
         except TimeoutError:
-            raise
+            if self._inbox.empty():
+                raise
+            found = None
         except OSError:
             found = None
         self.heard = time.monotonic()

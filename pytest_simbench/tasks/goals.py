@@ -272,7 +272,7 @@ def digest(policy: Any) -> str:
     """Of a policy's source and of the numbers and texts that it holds; others (the weights of a
     network, for instance) do not count."""
     text = [name_of(policy)]
-    made = policy._act if isinstance(policy, Function) else policy
+    made: Any = policy._act if isinstance(policy, Function) else policy
     with suppress(OSError, TypeError), _PARSING:
         text.append(_source(made if inspect.isroutine(made) else type(made)))
     for name, value in sorted(getattr(policy, "__dict__", {}).items()):

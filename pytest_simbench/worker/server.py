@@ -240,8 +240,8 @@ class Server:
         inside: dict[str, Any] | None,
     ) -> dict[str, Any]:
         """Step under a policy: the client's, which is asked by messages, or one that runs here."""
-        stepper, period = self._loaded(), every * self._constructed().settings.timestep
         try:
+            stepper, period = self._loaded(), every * self._constructed().settings.timestep
             if inside is not None:
                 answer = run_inside(self.scene, stepper.told, period, inside)
             else:

@@ -41,10 +41,6 @@ def unpack(value: Any) -> Any:
     return value
 
 
-AT_ONCE = 65536
-"""Bytes that are asked for first: a question without a picture is shorter."""
-
-
 def frame(data: bytes) -> bytes:
     """Bytes as they go through a socket, their number first."""
     return len(data).to_bytes(4, "big") + data
@@ -53,16 +49,15 @@ def frame(data: bytes) -> bytes:
 def framed(connection: socket.socket) -> bytes | None:
     """The next bytes that came through a socket; None: there are none.
 
-    A time-out holds until the first of them has come. Questions and replies take turns, so there
-    is never more than one here.
+    A time-out holds until the first of them has come.
     """
-    parts = [connection.recv(AT_ONCE)]
-    length = int.from_bytes(parts[0][:4], "big") if len(parts[0]) > 3 else 0
-    length -= len(parts[0]) - 4
-    while length > 0 and (part := connection.recv(length, socket.MSG_WAITALL)):
+    head = connection.recv(4, socket.MSG_WAITALL)
+    length = int.from_bytes(head, "big") if len(head) == 4 else 0
+    parts = []
+    while length and (part := connection.recv(length, socket.MSG_WAITALL)):
         parts.append(part)
         length -= len(part)
-    return b"".join(parts)[4:] or None
+    return b"".join(parts) or None
 
 
 def readable(text: str, longest: int = LONGEST) -> str:

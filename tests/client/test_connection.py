@@ -16,13 +16,14 @@ import psutil
 import pytest
 from execnet.gateway_io import popen_bootstrapline
 
-from pytest_simbench.client.connection import BOOTSTRAP
+from pytest_simbench.client.connection import BOOTSTRAP, Connection
 from pytest_simbench.client.errors import Where
 from pytest_simbench.client.launch import Launch
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.worker.wire import frame
 from tests.tiny import Falling
 
 
@@ -62,6 +63,23 @@ def test_an_error_that_nobody_asked_for_is_not_printed(tmp_path: Path) -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     assert (done.stdout, done.stderr) == ("True\n", "")
+
+
+def test_the_mark_that_ends_a_loop_is_read_before_the_answer_that_is_here_already() -> None:
+    """Else the next loop's first question came four bytes late: numbers, but not the state's."""
+    connection = Connection(None, None, {}, None)
+    assert connection._theirs is not None
+    connection._theirs.sendall(frame(b""))
+    connection._arrived("answer")
+    assert connection.take(5.0) == "answer"
+    connection._theirs.sendall(frame(b"question") + frame(b""))
+    assert connection.take(5.0) == b"question"
+    connection._arrived("next answer")
+    assert connection.take(5.0) == "next answer"
+    connection._arrived("an error without a mark")
+    assert connection.take(0.1) == "an error without a mark"
+    connection.exchange.close()
+    connection._theirs.close()
 
 
 SSHD = shutil.which("sshd") or "/usr/sbin/sshd"
