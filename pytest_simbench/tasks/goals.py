@@ -263,18 +263,13 @@ _PARSING = Lock()
 106905): one of 1400 pushes side by side ended so."""
 
 
-@lru_cache(256)
-def _source(made: Any) -> str:
-    return inspect.getsource(made)
-
-
 def digest(policy: Any) -> str:
     """Of a policy's source and of the numbers and texts that it holds; others (the weights of a
     network, for instance) do not count."""
     text = [name_of(policy)]
-    made: Any = policy._act if isinstance(policy, Function) else policy
+    made = policy._act if isinstance(policy, Function) else policy
     with suppress(OSError, TypeError), _PARSING:
-        text.append(_source(made if inspect.isroutine(made) else type(made)))
+        text.append(inspect.getsource(made if inspect.isroutine(made) else type(made)))
     for name, value in sorted(getattr(policy, "__dict__", {}).items()):
         if isinstance(value, int | float | str | list | tuple | dict | np.ndarray):
             text.append(f"{name}={value!r}")
