@@ -7,10 +7,9 @@ would have; and what it has recorded it does not repeat."""
 from __future__ import annotations
 
 import json
-import math
 import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,6 +18,8 @@ import numpy as np
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.simulator.ranges import Linear, Log, Searched, changes, searched
 from pytest_simbench.simulator.settings import Settings
+from pytest_simbench.tuning.judging import recommended
+from pytest_simbench.tuning.steps import TRIES, acts, between, corners, near, own_values
 from pytest_simbench.tuning.target import TuningError
 from pytest_simbench.tuning.trials import Candidate, Trials
 
@@ -111,7 +112,7 @@ class Search:
             time.monotonic() - began < seconds and (most is None or number < most)
         ):
             if number % 2 and number == len(study.trials):
-                study.enqueue_trial(self._step(number))
+                study.enqueue_trial(self._step(number, known))
             trial = self._trial(library, study, number)
             values = self._suggested(trial) if trial else study.trials[number].user_attrs["values"]
             asked = changes(values, self.base)
@@ -164,7 +165,7 @@ class Search:
         found: dict[str, Any] = {}
         settings = dict(vars(self.base))
         for one in self.space:
-            if one.when and settings[one.when[0]] not in one.when[1:]:
+            if not acts(one, settings):
                 continue
             value = self._one(trial, one)
             found[one.name] = settings[one.setting] = value
@@ -182,48 +183,41 @@ class Search:
     def _first(self) -> list[dict[str, Any]]:
         """Today's values, and each with one changed: half-way to either end of its range on its
         scale, or another choice. Most settings that are drawn at random do not work at all."""
-        own, found = self._own(), [self._own()]
+        own = own_values(self.space, self.base)
+        found = [own]
         for one in self.space:
-            if isinstance(one.over, tuple):
-                others = [choice for choice in one.over if choice != own.get(one.name, choice)]
-            elif one.name in own:
-                others = [
-                    _between(own[one.name], end, one) for end in (one.over.high, one.over.low)
-                ]
-            else:
-                others = []
+            if one.name not in own:
+                continue
+            others = near(own, one)
+            if not isinstance(one.over, tuple):
+                others = [between(own[one.name], end, one) for end in (one.over.high, one.over.low)]
             found += [{**own, one.name: value} for value in others if value != own[one.name]]
         return found
 
-    def _step(self, number: int) -> dict[str, Any]:
-        """The values of a point of the front with one changed: to an end of its range or half-way
-        there, where Optuna's sampler hardly comes, or another choice."""
-        rng = np.random.default_rng([self.seed, number])
+    def _step(self, number: int, known: Collection[str]) -> dict[str, Any]:
+        """Values where Optuna's sampler hardly comes: in turns those of the point that would be
+        recommended now, of the truest and of any of the front, each with one or two changed to an
+        end of its range, a part of the way there, or another choice; and then of the corners of all
+        ranges a row in which each pair of settings meets as it has not yet."""
+        rng, turn = np.random.default_rng([self.seed, number]), number // 2
         best = front(self.done, self.trials)
-        point, one = (
-            best[int(rng.integers(len(best)))],
-            self.space[int(rng.integers(len(self.space)))],
-        )
-        found = self._own(point.changes)
-        if isinstance(one.over, tuple):
-            return {**found, one.name: one.over[rng.integers(len(one.over))]}
-        end = (one.over.low, one.over.high)[rng.integers(2)]
-        half = rng.integers(2) and one.name in found
-        return {**found, one.name: _between(found[one.name], end, one) if half else end}
-
-    def _own(self, changed: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """Today's values, some changed, as far as they lie where is searched."""
-        found = {}
-        settings = {**vars(self.base), **(changed or {})}
-        for one in self.space:
-            value = settings[one.setting]
-            value = value if one.part is None else value[one.part]
-            inside = value in one.over if isinstance(one.over, tuple) else (
-                value is not None and one.over.low <= value <= one.over.high
-            )  # fmt: skip
-            if inside:
-                found[one.name] = value
-        return found
+        if turn % 4 == 3:
+            rows = corners(self.space, np.random.default_rng(self.seed))
+            return rows[turn // 4 % len(rows)]
+        first = (recommended(self.done, self.trials)[0], best[-1], best[rng.integers(len(best))])
+        point = first[turn % 4]
+        own = own_values(self.space, self.base, point.changes)
+        settings = {**vars(self.base), **point.changes}
+        acting = [one for one in self.space if acts(one, settings)]
+        for many in rng.permutation([1, 2]):
+            for _ in range(TRIES):
+                values = dict(own)
+                for one in rng.permutation(np.array(acting, object))[:many]:
+                    other = near(own, one)
+                    values[one.name] = other[rng.integers(len(other))]
+                if self._key(changes(values, self.base)) not in known:
+                    return values
+        return own
 
     def _key(self, asked: Mapping[str, Any]) -> str:
         """Equal for equal settings."""
@@ -233,12 +227,6 @@ class Search:
         """What Optuna is told: of one that failed before it cost anything ten times today's."""
         cost = found.cost()
         return min(cost, 10 * today.cost()), self.trials.error(found)
-
-
-def _between(value: float, end: float, one: Searched) -> float:
-    """Half-way to an end of the range; a whole number where the setting wants one."""
-    middle = math.sqrt(value * end) if isinstance(one.over, Log) else (value + end) / 2
-    return round(middle) if one.whole else middle
 
 
 def front(done: Sequence[Candidate], trials: Trials) -> list[Candidate]:
