@@ -91,11 +91,12 @@ def tune(
         print(for_terminal("\n".join(["", *lines])))
         if found is not done[0]:
             text = _profile(found, case, looks, why)
-            write_whole(path, f"{name}.tuned.toml", text.encode())
+            with refusing(OSError, str(path)):
+                write_whole(path, f"{name}.tuned.toml", text.encode())
             print(f"profile: {shown(path / f'{name}.tuned.toml', Path.cwd())}")
         points = [(c.cost(), looks.error(c)) for c in done if not c.ended and c.costs]
         best = [(c.cost(), looks.error(c)) for c in front(done, looks)]
-        with suppress(FiguresUnavailable), drawing():
+        with suppress(FiguresUnavailable), drawing(), refusing(OSError, str(path)):
             figure = draw(points, best, points[0], wanted.cost, wanted.unit)
             print(f"picture: {shown(write(path, [('front', figure)])[0], Path.cwd())}")
     return 0
@@ -150,7 +151,7 @@ def _judge(trials: Trials, today: Candidate, found: Candidate, seconds: float) -
         return []
     looks = trials.target.judged
     if not trials.target.deterministic:
-        took = [r.seconds["total"] for one in (today, found) for r in one.records.values()]
+        took = [r.cost("total") or 0.1 for c in (today, found) for r in c.records.values()]
         each = 2 * sum(took) / len(took)
         looks = looks[: max(FEWEST_JUDGED, int(seconds / each))]
     return trials.judge(today, found, looks=looks)

@@ -1,8 +1,8 @@
-"""The search: Optuna proposes settings, repetitions tell cost and error, a journal keeps both.
+"""The search: Optuna proposes settings, repetitions tell cost and error.
 
 The trials of a search come one after the other from one process. Each has a sampler of its own,
-seeded by the search's seed and its number, so that a search that was interrupted goes on as it
-would have; and what it has recorded it does not repeat."""
+seeded by the search's seed and its number, so that a search that was interrupted comes by the same
+trials again; what is recorded it does not repeat, and then goes on as it would have."""
 
 from __future__ import annotations
 
@@ -22,9 +22,6 @@ from pytest_simbench.tuning.judging import recommended
 from pytest_simbench.tuning.steps import TRIES, acts, between, corners, near, own_values
 from pytest_simbench.tuning.target import TuningError
 from pytest_simbench.tuning.trials import Candidate, Trials
-
-JOURNAL = "optuna.log"
-"""Of the trials, in the run folder: lines of JSON."""
 
 STARTUP = 10
 """Trials before the sampler learns from them."""
@@ -94,11 +91,10 @@ class Search:
             TuningError: no Optuna, nothing that runs, or too little time.
         """
         library = optuna()
-        spent = sum(r.seconds["total"] for r in self._recorded())
-        began = time.monotonic() - spent
+        began = time.monotonic()
         today = self.trials.today()
         self.done = [today]
-        took = sum(record.seconds["total"] for record in today.records.values())
+        took = sum(record.cost("total") or 0.0 for record in today.records.values())
         if seconds < FEWEST * took and most is None:
             raise TuningError(
                 f"{seconds:.0f} s are too few to search: today's settings alone took {took:.0f} s; "
@@ -107,57 +103,33 @@ class Search:
         study = self._study(library)
         known = {self._key({}): today}
         number = 0
-        begun = sum(trial.state.name != "WAITING" for trial in study.trials)
-        while number < begun or (
-            time.monotonic() - began < seconds and (most is None or number < most)
-        ):
+        while time.monotonic() - began + self.trials.spent < seconds and number != most:
             if number % 2 and number == len(study.trials):
                 study.enqueue_trial(self._step(number, known))
             trial = self._trial(library, study, number)
-            values = self._suggested(trial) if trial else study.trials[number].user_attrs["values"]
-            asked = changes(values, self.base)
+            asked = changes(self._suggested(trial), self.base)
             key = self._key(asked)
             if key not in known:
                 known[key] = self.trials.choose(f"trial{number}", asked, self.done)
                 self.done.append(known[key])
                 self.tell(known[key], front(self.done, self.trials))
-            if trial is not None:
-                study.tell(trial, self._values(known[key], today))
+            study.tell(trial, self._values(known[key], today))
             number += 1
         return self.done
 
-    def _recorded(self) -> Sequence[Any]:
-        return self.trials.resumed.records if self.trials.resumed else ()
-
     def _study(self, library: Any) -> Any:
-        storage = library.storages
-        path = self.trials.folder.path / JOURNAL
-        fresh = not path.exists()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            journal = storage.JournalStorage(storage.journal.JournalFileBackend(str(path)))
-            study = library.create_study(
-                study_name="simbench", storage=journal, load_if_exists=True,
-                directions=["minimize", "minimize"],
-            )  # fmt: skip
-        if fresh:
-            for values in self._first():
-                study.enqueue_trial(values)
+        study = library.create_study(directions=["minimize", "minimize"])
+        for values in self._first():
+            study.enqueue_trial(values)
         return study
 
     def _trial(self, library: Any, study: Any, number: int) -> Any:
-        """The trial of a number: a new one, or one that was interrupted; None where it is told."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # group is experimental
             study.sampler = library.samplers.TPESampler(
                 seed=self.seed * 1_000_003 + number, multivariate=True, group=True,
                 n_startup_trials=STARTUP,
             )  # fmt: skip
-        states = [trial.state.name for trial in study.trials]
-        if number < len(states) and states[number] == "RUNNING":
-            return library.trial.Trial(study, study.trials[number]._trial_id)
-        if number < len(states) and states[number] != "WAITING":
-            return None
         return study.ask()
 
     def _suggested(self, trial: Any) -> dict[str, Any]:
@@ -169,7 +141,6 @@ class Search:
                 continue
             value = self._one(trial, one)
             found[one.name] = settings[one.setting] = value
-        trial.set_user_attr("values", found)
         return found
 
     def _one(self, trial: Any, one: Searched) -> Any:

@@ -78,6 +78,7 @@ class Trials:
         case: how repetitions are run, with the settings that the search began with.
         executor, progress, folder: where, what tells of it, and where records go.
         resumed: what an earlier search left in the folder.
+        spent: what of it was taken took [s].
     """
 
     target: Target
@@ -87,6 +88,7 @@ class Trials:
     folder: RunFolder
     resumed: Resumed | None = None
     timeout: float | None = None
+    spent: float = 0.0
     _today: dict[Look, Record] = field(default_factory=dict)
 
     def today(self) -> Candidate:
@@ -102,7 +104,7 @@ class Trials:
             record = next(iter(found.records.values()))
             why = record.error.message if record.error else "they fail"
             raise TuningError(f"today's settings cannot be judged: {why:.300}")
-        took = [record.seconds["total"] for record in found.records.values()]
+        took = [record.cost("total") or 0.0 for record in found.records.values()]
         self.timeout = float(max(SHORTEST, round(SLOWER * max(took))))
         return found
 
@@ -152,7 +154,9 @@ class Trials:
         if problem := experiment.problem():
             raise TuningError(problem)
         kept = self.resumed.take(experiment, None) if self.resumed else {}
-        if look.number not in kept:
+        if look.number in kept:
+            self.spent += kept[look.number].cost("total") or 0.0
+        else:
             self.folder.describe(experiment.task)
             repeater = Repeater(experiment, self.executor, self.progress, self.folder.append)
             try:

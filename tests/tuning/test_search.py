@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.records.folder import RECORDS
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tuning.search import Search, front, space_of
 from pytest_simbench.tuning.target import TuningError
@@ -53,10 +54,17 @@ def test_it_goes_on_as_if_it_had_not_been_interrupted(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         part.run(1e9, 12)
     part.trials.folder.close()
+    elsewhere = tmp_path / "elsewhere"  # what else the folder may hold is neither read nor written
+    elsewhere.mkdir()
+    for name in {path.name for path in (tmp_path / "part").iterdir()} - {RECORDS}:
+        (elsewhere / name).write_text("torn")
+        (tmp_path / "part" / name).unlink(missing_ok=True)
+        (tmp_path / "part" / name).symlink_to(elsewhere / name)
     rest, second = search(tmp_path / "part")
     assert [dict(c.changes) for c in rest.run(1e9, 12)] == wanted
     kept = first.asked[:-1]  # the last one was under way
     assert not {*kept} & {*second.asked}
+    assert {path.read_text() for path in elsewhere.iterdir()} == {"torn"}
 
 
 def test_it_makes_no_more_trials_than_it_may(tmp_path: Path) -> None:
