@@ -126,7 +126,10 @@ class SceneFiles:
                     f"{starts}: {len(rows)} starts, and {different} different in how the bodies "
                     f"lie to each other: as evidence they count as {different}"
                 )
-        keep(self.folder, at.name, found.account)
+        try:
+            keep(self.folder, at.name, found.account)
+        except OSError as error:
+            self.tell(f"{self.folder / PAGE} could not be written ({error.strerror or error})")
         for line in terminal_lines(found.account):
             self.tell(f"{at.name}: {line} ({PAGE})")
         return scene

@@ -14,6 +14,7 @@ from pytest_simbench.ground.errors import SettingsError, SimulatorError
 from pytest_simbench.ground.files import FileError, read_file
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.versions import base_name
+from pytest_simbench.records.checked import convert, plain
 from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.simulator.registry import seeds_seen, settings_of
 from pytest_simbench.simulator.settings import Settings
@@ -95,7 +96,10 @@ def read_profile(path: str | Path) -> ProfileFile:
     changes, chosen = tables
     seeds = chosen.get("seeds", [])
     try:
-        seen = tuple(Seen.seeds(str(task), int(first), int(last)) for task, first, last in seeds)
+        seen = tuple(
+            convert(plain({"task": task, "first": first, "last": last}), Seen)
+            for task, first, last in seeds
+        )
     except (TypeError, ValueError):
         raise SettingsError(f"{path}: seeds are lists [TASK, FIRST, LAST]") from None
     found = ProfileFile(str(path), base_name(simulator), base, changes, seen)

@@ -123,10 +123,10 @@ def _of_type(value: Any, hint: type) -> Any:
             return None
         try:
             number = hint(value)
-            same = isinstance(value, str) or number == value
+            same = math.isfinite(number) and (isinstance(value, str) or number == value)
         except (TypeError, ValueError, OverflowError):
             return None
-        return number if same and math.isfinite(number) else None
+        return number if same else None
     return _same(value, hint)
 
 

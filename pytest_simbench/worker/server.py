@@ -98,7 +98,7 @@ class Server:
         self.scene = Scene("empty")
         self.compared: tuple[dict[str, Any], dict[str, Any]] | None = None
         self.saved: dict[str, Any] = {}
-        self.number = 0
+        self.number, self.pid = 0, os.getpid()
 
     def answer(self, request: dict[str, Any]) -> None:
         """Carry out one request and send its answer, whatever happens."""
@@ -258,7 +258,14 @@ class Server:
                 self.exchange.sendall(frame(b""))  # no question: the answer comes
 
     def _exchange(self, question: bytes) -> bytes | None:
-        """The client's reply to a question."""
+        """The client's reply to a question.
+
+        Raises:
+            RuntimeError: the engine forked, and this is its child.
+        """
+        if os.getpid() != self.pid:
+            self.number = 0  # of no request, so that the client sees that two answer
+            raise RuntimeError("a fork of the worker asks, too")
         if self.exchange is None:
             self.send(question)
             reply: bytes | None = self.receive()

@@ -354,6 +354,7 @@ FAULTS: dict[str, Callable[[Any], object]] = {
     "FloodsTheLog": lambda simulator: (flood(simulator), time.sleep(600.0)),
     "FloodsAtOnce": flood,
     "Forks": fork,
+    "ForksOn": lambda simulator: [os.fork()],
     "HangsUp": hang_up,
     "HalfAnswer": lambda simulator: send(b"\4\0\0\0\1\0\0\3\350" + b"0123456789"),  # of 1000 bytes
     "Garbage": lambda simulator: send(b"c" + bytes(8)),  # a message of no known kind

@@ -232,3 +232,12 @@ def test_what_does_not_travel(world: Worlds) -> None:
     policy.lock = threading.Lock()  # type: ignore[attr-defined]
     with pytest.raises(PolicyFailed, match="holds lock, which cannot go to the worker"):
         world().control(policy, until=0.1, inside=True)
+
+
+@pytest.mark.parametrize("fault", ["Forks", "ForksOn"])
+def test_an_engine_that_forks_is_not_asked_by_two(case: Case, fault: str) -> None:
+    forking = replace(case, adapter=f"tests.client.faulty:{fault}")
+    record, _ = Repetition(Experiment(forking, Reaching(still, seconds=1.0)), 1).run()
+    assert record.error is not None
+    assert record.error.type == "ProtocolError"
+    assert "an engine forks" in record.error.message

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import shutil
@@ -87,6 +88,7 @@ def no_pictures() -> Iterator[None]:
 def folder() -> Path:
     """A run with everything that a run may hold, and a file of pytest-benchmark."""
     path = Path(tempfile.mkdtemp(prefix="simbench-fuzz-"))
+    atexit.register(shutil.rmtree, path)
     run, kept = RunFolder(path), []
     for k in (1, 2, 3):
         notes = Notes(
