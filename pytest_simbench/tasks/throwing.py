@@ -222,11 +222,13 @@ class Throwing(Task):
         world.mark("end")
         far = STUDY_TOLERANCE * self.scale
         pyramid = [name for name in before if name != "projectile"]
+        pushed: dict[str, float] = {}
 
         def pushes(settling: Motion | None) -> dict[str, float]:
             return {} if thrown is None else _pushes(thrown, settling, world.scene, self.scale)
 
         def slacks(settling: Motion) -> Iterator[Slack]:
+            nonlocal pushed
             pushed = pushes(settling)
             for name in pyramid:
                 off = _off(before[name], world.pose(name))
@@ -237,7 +239,8 @@ class Throwing(Task):
         with world.phase("settle"):
             settling, wait = settle(world, self.settle, slacks, full=self.full_wait)
         off = [name for name in pyramid if _off(before[name], world.pose(name)) > far]
-        pushed = pushes(settling)
+        if not wait.bound:
+            pushed = pushes(settling)
         hit = [name for name in off if pushed.get(name, 0.0) > 0.0]
         moved = hit if self.by_throw else off
         count(len(moved), len(PYRAMID))
