@@ -67,7 +67,7 @@ class _LazyModule(ModuleType):
         if attribute.startswith("__"):
             raise AttributeError(attribute)
         found = getattr(importlib.import_module(self.__name__), attribute)
-        setattr(self, attribute, found)  # asked for once: importing took 2 % of a step of MuJoCo
+        setattr(self, attribute, found)  # once: importing took 2 % of a fast step
         return found
 
 
