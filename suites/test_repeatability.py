@@ -16,7 +16,7 @@ GENTLE = {"x": 0.002, "y": 0.002, "yaw": math.radians(2), "mass": 0.1, "friction
 
 def test_replay(replay):
     """A simulator that claims to be deterministic repeats every bit."""
-    replay(Throwing(settle=22.0)).assert_as_claimed()
+    replay(Throwing(settle=22.0, full_wait=True)).assert_as_claimed()
 
 
 def test_gentle_perturbations(perturb, threshold):
@@ -37,6 +37,6 @@ def test_smallest_perturbation(perturb, threshold):
 
 def test_sensitivity(perturb, threshold):
     """A cube that lies a tenth of a millimetre off is held at most 10 mm off."""
-    result = perturb(Throwing(settle=22.0)).sensitivity("projectile")
+    result = perturb(Throwing(settle=22.0, full_wait=True)).sensitivity("projectile")
 
     result.assert_below(threshold("growth", 100.0), until="in the grip")

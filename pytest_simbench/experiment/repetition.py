@@ -286,6 +286,7 @@ class Repetition:
             profile_file=case.file.path if case.file else "",
             sample=self.experiment.task.sample(self.seed),
             reading=outcome.reading,
+            wait=outcome.wait,
         )
         return record_of(
             self.experiment,

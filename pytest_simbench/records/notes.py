@@ -9,6 +9,25 @@ from pytest_simbench.records.tuned_on import Sample, Seen
 
 
 @dataclass(frozen=True)
+class Wait:
+    """How long a task waited for its count.
+
+    Attributes:
+        seconds, of: simulated time that it waited, and the whole wait [s].
+        bound: what was nearest to a change when it ended early, `support of cube_07`; empty: it
+            waited in full.
+        reach, slack: how far that body might have moved in the rest of the wait, and how far it
+            would have had to [m].
+    """
+
+    seconds: float
+    of: float
+    bound: str = ""
+    reach: float = 0.0
+    slack: float = 0.0
+
+
+@dataclass(frozen=True)
 class Notes:
     """What the tool notes of a repetition besides its numbers.
 
@@ -24,6 +43,7 @@ class Notes:
         profile_file: the file that its profile is of, as it was given.
         sample: the measured motion that it was held against.
         reading: of a law: measured, right, and the tolerance.
+        wait: for the count.
         lost_nodes: machines of a cluster that were lost with it before, and how.
     """
 
@@ -39,4 +59,5 @@ class Notes:
     profile_file: str = ""
     sample: Sample | None = None
     reading: Reading | None = None
+    wait: Wait | None = None
     lost_nodes: tuple[str, ...] = ()

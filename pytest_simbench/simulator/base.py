@@ -66,7 +66,9 @@ class _LazyModule(ModuleType):
     def __getattr__(self, attribute: str) -> Any:
         if attribute.startswith("__"):
             raise AttributeError(attribute)
-        return getattr(importlib.import_module(self.__name__), attribute)
+        found = getattr(importlib.import_module(self.__name__), attribute)
+        setattr(self, attribute, found)  # once: importing took 2 % of a fast step
+        return found
 
 
 def lazy_import(name: str) -> Any:

@@ -13,6 +13,7 @@ from pytest_simbench.client.tape import Tape
 from pytest_simbench.client.world import World
 from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.notes import Wait
 from pytest_simbench.records.readings import Reading
 from pytest_simbench.scene import Box, Pose, Robot, Scene, Vector3
 
@@ -59,6 +60,7 @@ class Outcome:
         metrics: value of each of the task's metrics; None where there is none.
         details: whatever explains the score, as plain data.
         reading: of a law.
+        wait: for the count, if that may be short.
         reasons: why the score is no better, one short text for each thing that went wrong; reports
             count them.
     """
@@ -66,6 +68,7 @@ class Outcome:
     metrics: dict[str, float | None] = field(default_factory=dict)
     details: dict[str, Any] = field(default_factory=dict)
     reading: Reading | None = None
+    wait: Wait | None = None
     reasons: tuple[str, ...] = ()
 
 

@@ -6,7 +6,7 @@ All lengths here are those of the study's scene. That of a smaller arm is smalle
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any, ClassVar
@@ -34,6 +34,7 @@ from pytest_simbench.tasks.base import (
     scaled,
 )
 from pytest_simbench.tasks.manipulator import Manipulator, cannot_handle
+from pytest_simbench.tasks.waiting import Slack, settle
 
 TABLE_TOP = 0.30
 """Height of the table top [m] (study code, Webots)."""
@@ -83,6 +84,7 @@ class Stacking(Task):
         finger_closed: position commanded to each finger to grasp [m]; None: the hand's own.
         speeds: of the arm.
         settle: from the end of the task to the count at the end [s].
+        full_wait: wait all of it, else only while something can change (`waiting`).
         robot: that stacks; None: the Panda.
     """
 
@@ -99,6 +101,7 @@ class Stacking(Task):
     finger_closed: float | None = None
     speeds: Speeds = field(default_factory=Speeds)
     settle: float = 60.0
+    full_wait: bool = False
     robot: Robot | None = None
 
     @property
@@ -168,6 +171,7 @@ class Stacking(Task):
             finger_closed=0.02,
             speeds=FULL_SPEED,
             settle=60.0,
+            full_wait=True,
         )
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
@@ -229,8 +233,27 @@ class Stacking(Task):
             picks.note_motion(manipulator.try_go_home())
         world.mark("end")
         with world.phase("settle"):
-            world.wait(self.settle)
-        return self._score(start, world.poses(), picks)
+            _, wait = settle(
+                world,
+                self.settle,
+                lambda motion: self._slacks(start, world.poses(), picks),
+                full=self.full_wait,
+            )
+        return replace(self._score(start, world.poses(), picks), wait=wait)
+
+    def _slacks(
+        self, start: Mapping[str, Pose], now: Mapping[str, Pose], picks: _Picks
+    ) -> Iterator[Slack]:
+        """Of every count of `_score` at the end."""
+        for name, pose in now.items():
+            if name in picks.stacked:
+                place, _ = picks.stacked[name]
+                loose = STUDY_TOLERANCE * self.scale - _aside(place, pose)
+                yield Slack(name, "at_end", abs(loose))
+                yield Slack(name, "at_end_strict", abs(_strictly(place, pose, self.scale)))
+            if name not in picks.handled:
+                moved = distance(pose, start[name]) - UNTOUCHED_DISTANCE * self.scale
+                yield Slack(name, "untouched_moved", abs(moved))
 
     def _stack(self, manipulator: Manipulator, name: str, place: Place, picks: _Picks) -> bool:
         """Bring one cube to its place and count it; False when it could not be done."""
@@ -333,13 +356,23 @@ class _Picks:
 
 def _placed(place: Place, pose: Pose, scale: float = 1.0) -> bool:
     """Within the study's distance, scaled, and as it measures: height and order do not matter."""
-    x, y, _ = np.abs(np.subtract(pose.position, place.pose.position))
-    return bool(x <= STUDY_TOLERANCE * scale and y <= STUDY_TOLERANCE * scale)
+    return _aside(place, pose) <= STUDY_TOLERANCE * scale
+
+
+def _aside(place: Place, pose: Pose) -> float:
+    """In x or in y, whichever is more [m]."""
+    return float(np.abs(np.subtract(pose.position, place.pose.position))[:2].max())
 
 
 def _strict(place: Place, pose: Pose, scale: float = 1.0) -> bool:
-    offset = np.abs(np.subtract(pose.position, place.pose.position))
-    return bool((offset <= STRICT_DISTANCE * scale).all() and pose.tilt() < STRICT_TILT)
+    return _strictly(place, pose, scale) >= 0.0
+
+
+def _strictly(place: Place, pose: Pose, scale: float) -> float:
+    """How far a corner must move to leave what is strictly the place [m]; below 0: outside."""
+    off = np.abs(np.subtract(pose.position, place.pose.position)).max()
+    corner = np.sqrt(0.75) * CUBE_SIZE * scale
+    return float(min(STRICT_DISTANCE * scale - off, (STRICT_TILT - pose.tilt()) * corner))
 
 
 def error_of(target: Pose, pose: Pose) -> Sequence[float]:

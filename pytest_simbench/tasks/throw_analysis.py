@@ -124,11 +124,13 @@ class _Chain:
 
     def touched(self, a: int, b: int, k: int, since: int = 0) -> bool:
         """Whether two bodies touched within `WINDOW` before sample k."""
-        touch = TOUCH * self._scale
+        rows = np.arange(max(int(self.earlier[k]), since), k + 1)
+        reach = TOUCH * self._scale + self.strides[rows, a] + self.strides[rows, b]
+        first, second = self.poses[rows, a], self.poses[rows, b]
+        apart = np.linalg.norm(first[:, :3] - second[:, :3], axis=1) - np.sqrt(3) * self.edge
         return any(
-            _distance(self.edge, self.poses[row, a], self.poses[row, b])
-            <= touch + self.strides[row, a] + self.strides[row, b]
-            for row in range(max(int(self.earlier[k]), since), k + 1)
+            _distance(self.edge, first[i], second[i]) <= reach[i]
+            for i in np.flatnonzero(apart <= reach)
         )
 
     def calm_after(self, began: int) -> int:
@@ -272,7 +274,7 @@ class Thrown:
         states = motion.bodies[:, number]
         self._position, self._velocity = states[:, :3], states[:, 7:10]
         joints = motion.joints[:, 0]
-        tool = np.array([model.tool_pose(row).position for row in joints])
+        tool = np.array([model.tool_transform(row).translation for row in joints])
         apart = np.linalg.norm(self._position - tool, axis=1) > OUT_OF_HAND * scale
         fingers = joints[:, model.robot.finger_indices] * model.finger_lever
         gone = apart | unclenched(fingers, UNCLENCHED * scale)

@@ -11,7 +11,7 @@ All lengths here are those of the study's scene. That of a smaller arm is smalle
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import ClassVar
@@ -33,7 +33,7 @@ from pytest_simbench.motion.throw import (
 )
 from pytest_simbench.motion.timing import synchronised_move
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Scene
+from pytest_simbench.scene import STANDARD_GRAVITY, Pose, Robot, Scene
 from pytest_simbench.tasks.arm import LostCube, Speeds
 from pytest_simbench.tasks.base import (
     CUBE_SIZE,
@@ -49,6 +49,7 @@ from pytest_simbench.tasks.base import (
 )
 from pytest_simbench.tasks.manipulator import Manipulator, cannot_handle
 from pytest_simbench.tasks.throw_analysis import Thrown, impact
+from pytest_simbench.tasks.waiting import Slack, settle
 
 PROJECTILE = Pose.at(0.5, 0.0, CUBE_SIZE / 2)
 """The cube to be thrown lies on the ground (study code)."""
@@ -61,9 +62,6 @@ PYRAMID = (
 
 AFTER_THROW = 1.0
 """For so long after the swing the motion is sampled at every step [s]: flight and impact."""
-
-SETTLE_PERIOD = 0.05
-"""Sampling while everything settles [s]; 20 Hz cost nothing."""
 
 STUDY_SPEEDS = Speeds(free=0.5, carry=0.5, contact=0.5)
 """Of every motion before the throw, the wind-up too (study code, throw_moveit.cpp; other versions
@@ -88,6 +86,7 @@ class Throwing(Task):
         by_throw: only what the thrown cube moved counts as moved; else, as in the study, every cube
             that is elsewhere in the end.
         settle: from the throw to the count [s] (study: 60).
+        full_wait: wait all of it, else only while something can change (`waiting`).
         robot: that throws; None: the Panda.
     """
 
@@ -106,6 +105,7 @@ class Throwing(Task):
     feasible: bool = True
     by_throw: bool = True
     settle: float = 60.0
+    full_wait: bool = False
     robot: Robot | None = None
 
     @property
@@ -166,7 +166,14 @@ class Throwing(Task):
 
     def study(self) -> Throwing:
         """The study's throw and count; each difference stands in docs/study.md."""
-        return replace(self, wind_up_speed=0.5, speeds=STUDY_SPEEDS, feasible=False, by_throw=False)
+        return replace(
+            self,
+            wind_up_speed=0.5,
+            speeds=STUDY_SPEEDS,
+            feasible=False,
+            by_throw=False,
+            full_wait=True,
+        )
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         rng = Randomness.of(seed).start
@@ -213,12 +220,28 @@ class Throwing(Task):
             details["failed_pick"] = str(error)
             reasons.append(str(error))
         world.mark("end")
-        with world.phase("settle"):
-            settling = world.wait(self.settle, log_period=SETTLE_PERIOD)
         far = STUDY_TOLERANCE * self.scale
-        off = [n for n in before if n != "projectile" and _moved(before[n], world.pose(n), far)]
-        pushed = set() if thrown is None else _moved_by(thrown, settling, world.scene, self.scale)
-        hit = [name for name in off if name in pushed]
+        pyramid = [name for name in before if name != "projectile"]
+        pushed: dict[str, float] = {}
+
+        def pushes(settling: Motion | None) -> dict[str, float]:
+            return {} if thrown is None else _pushes(thrown, settling, world.scene, self.scale)
+
+        def slacks(settling: Motion) -> Iterator[Slack]:
+            nonlocal pushed
+            pushed = pushes(settling)
+            for name in pyramid:
+                off = _off(before[name], world.pose(name))
+                yield Slack(name, "moved", abs(off - far))
+                if off > far and name in pushed:
+                    yield Slack(name, "moved by the throw", abs(pushed[name]))
+
+        with world.phase("settle"):
+            settling, wait = settle(world, self.settle, slacks, full=self.full_wait)
+        off = [name for name in pyramid if _off(before[name], world.pose(name)) > far]
+        if not wait.bound:
+            pushed = pushes(settling)
+        hit = [name for name in off if pushed.get(name, 0.0) > 0.0]
         moved = hit if self.by_throw else off
         count(len(moved), len(PYRAMID))
         metrics["moved"], metrics["hit"] = len(moved) / len(PYRAMID), float(bool(moved))
@@ -226,7 +249,7 @@ class Throwing(Task):
         details["moved"] = moved
         details["moved_otherwise"] = [name for name in off if name not in hit]
         details["projectile_end"] = list(world.pose("projectile").position)
-        return Outcome(metrics, details, reasons=tuple(reasons))
+        return Outcome(metrics, details, wait=wait, reasons=tuple(reasons))
 
     def _throw(self, manipulator: Manipulator) -> Thrown:
         """Swing, let go, and look on."""
@@ -263,14 +286,17 @@ def perfect_throw(
     return released(model, timed, duration, release_fraction, scale)
 
 
-def _moved(before: Pose, after: Pose, far: float = STUDY_TOLERANCE) -> bool:
-    """As the study counts: farther than 5 cm, scaled, in x or in y."""
-    x, y, _ = np.abs(np.subtract(after.position, before.position))
-    return bool(x > far or y > far)
+def _off(before: Pose, after: Pose) -> float:
+    """As the study counts: in x or in y, whichever is more [m]."""
+    return float(np.abs(np.subtract(after.position, before.position))[:2].max())
 
 
-def _moved_by(thrown: Thrown, settling: Motion | None, scene: Scene, scale: float) -> set[str]:
-    """The bodies that the thrown cube moved out of their places; see `impact`."""
+def _pushes(
+    thrown: Thrown, settling: Motion | None, scene: Scene, scale: float
+) -> dict[str, float]:
+    """Of each body whose motion the thrown cube began (see `impact`): how much farther the throw
+    carried it than it crept on since [m]; infinite where the throw took it out of its place. Above
+    0 the throw moved it; what creeps a little farther is its doing."""
     log = Motion.joined([thrown.motion] if settling is None else [thrown.motion, settling])
     names = [body.name for body in scene.free_bodies]
     own = names.index("projectile")
@@ -278,16 +304,8 @@ def _moved_by(thrown: Thrown, settling: Motion | None, scene: Scene, scale: floa
     found = impact(
         log.time, log.bodies[:, own, :7], log.bodies[:, others, :7], CUBE_SIZE * scale, thrown.free
     )
-    far = STUDY_TOLERANCE * scale
-    first, rest, last = (log.bodies[row, others] for row in (0, found.rest, -1))
-    return {
-        names[others[i]]
-        for i in found.caused
-        if _moved(Pose.from_array(first[i]), Pose.from_array(rest[i]), far)
-        or _carried_most(first[i, :3], rest[i, :3], last[i, :3])
-    }
-
-
-def _carried_most(first: FloatArray, rest: FloatArray, last: FloatArray) -> bool:
-    """Whether the throw's motion is most of the way; what creeps a little farther is its doing."""
-    return bool(np.linalg.norm(rest - first) > np.linalg.norm(last - rest))
+    first, rest, last = (log.bodies[row, others, :3] for row in (0, found.rest, -1))
+    carried, since = (np.linalg.norm(b - a, axis=1) for a, b in ((first, rest), (rest, last)))
+    away = np.abs(rest - first)[:, :2].max(axis=1) > STUDY_TOLERANCE * scale
+    more = np.where(away, np.inf, carried - since)
+    return {names[others[i]]: float(more[i]) for i in found.caused}

@@ -42,7 +42,7 @@ from pytest_simbench.records.folder import (
     RunContents,
     RunFolder,
 )
-from pytest_simbench.records.notes import Notes
+from pytest_simbench.records.notes import Notes, Wait
 from pytest_simbench.records.record import Failure, RecordError
 from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.repeatability.agreement import FOLDER as SAMPLES
@@ -92,7 +92,11 @@ def folder() -> Path:
     run, kept = RunFolder(path), []
     for k in (1, 2, 3):
         notes = Notes(
-            log="logs/a.log", untested="?", filmed=True, chosen_on=(Seen(1, 2, task="stacking"),)
+            log="logs/a.log",
+            untested="?",
+            filmed=True,
+            chosen_on=(Seen(1, 2, task="stacking"),),
+            wait=Wait(2.0, 60.0, "support of a", 1e-6, 0.002),
         )
         good = record(repetition=k, metrics={"placed": k / 4, "at_end": 1.0}, notes=notes)
         error = Failure("WorkerHung", "no answer", "pick", "last line")

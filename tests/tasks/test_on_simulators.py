@@ -13,6 +13,8 @@ from pytest_simbench.client.errors import Unavailable
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.configuration import agree, differences
+from pytest_simbench.records.notes import Wait
 from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
@@ -53,6 +55,21 @@ def test_the_throw_hits(any_case: Case) -> None:
     assert record.metrics["lost_in_transit"] == 0.0
     # within 3 cm; Genesis' contacts are softer (docs/engines/genesis.md)
     assert record.metrics["landing_error"] < (0.05 if any_case.simulator == "genesis" else 0.03)
+
+
+def test_a_shorter_wait_changes_no_count_and_is_never_pooled_with_a_full_one(case: Case) -> None:
+    short, full = (
+        Repetition(Experiment(case, Throwing(settle=6.0, full_wait=full)), 1).run()[0]
+        for full in (False, True)
+    )
+    for name in ("moved", "hit", "moved_otherwise"):
+        assert short.metrics[name] == full.metrics[name] is not None
+    wait = Record.from_json(short.to_json()).notes.wait
+    assert wait is not None
+    assert (wait.seconds, wait.of, wait.reach < wait.slack) == (pytest.approx(2.0), 6.0, True)
+    assert full.notes.wait == Wait(pytest.approx(6.0), 6.0)
+    assert not agree(short, full)
+    assert "settings.task.full_wait was false, is true" in differences({"a": ([short], [full])})[0]
 
 
 def test_the_same_seed_gives_the_same_outcome(any_case: Case) -> None:

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.panda import READY
 from pytest_simbench.motion.registry import find
 from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.notes import Wait
 from pytest_simbench.scene import Box, Pose
 from pytest_simbench.tasks import Jitter, Stacking, stacking
 from pytest_simbench.tasks.arm import Speeds
@@ -36,6 +38,7 @@ from tests.tasks.scripted import (
 )
 
 ONE = Stacking(towers=1, levels=1)
+ONE_IN_FULL = replace(ONE, full_wait=True)
 SCORES = (
     *("placed", "at_end", "placed_strict", "at_end_strict"),
     *("towers", "untouched_moved", "failed_picks"),
@@ -59,7 +62,7 @@ def in_phase(process: ScriptedProcess, phase: str) -> list[Asked]:
 def test_every_score_of_a_world_with_one_of_everything() -> None:
     """No two scores are the same, so none can stand for another."""
     outcome, process = perform(
-        Stacking(towers=2, levels=3),
+        Stacking(towers=2, levels=3, full_wait=True),
         Mishap("pick cube 2 of 6", 2.6, drop),  # lost while it is lifted
         Mishap("check cube 4 of 6", 0.05, move(stacked(5), x=0.012)),  # in its place, not strictly
         Mishap("check cube 6 of 6", 0.05, move(stacked(7), y=0.06, z=-0.1)),  # fallen at once
@@ -106,7 +109,7 @@ def test_every_score_of_a_world_with_one_of_everything() -> None:
         (ONE, "check cube 1 of 1", 0.12, 0.0),  # 0.496 s after the release
         (ONE, "retreat cube 1 of 1", 0.004, 1.0),
         (ONE, "go home", 0.1, 1.0),
-        (ONE, "settle", 59.99, 1.0),
+        (ONE_IN_FULL, "settle", 59.99, 1.0),
         (ONE.study(), "retreat cube 1 of 1", 0.3, 0.0),  # the study counts after the retreat
         (ONE.study(), "check cube 1 of 1", 0.49, 0.0),
         (ONE.study(), "go home", 0.0, 1.0),
@@ -181,6 +184,18 @@ def test_a_tower_is_complete_with_all_of_its_cubes_strictly_in_place() -> None:
 def test_in_its_place_and_strictly_so(pose: Pose, placed: bool, strict: bool) -> None:
     """5 cm in x and in y; 1 cm in x, y and z and 5 degrees, whatever face it lies on."""
     assert (_placed(PLACE, pose), _strict(PLACE, pose)) == (placed, strict)
+
+
+def test_the_wait_ends_when_no_count_can_change_any_more() -> None:
+    """What creeps towards the end of its place keeps it running, as does an untouched cube."""
+    outcome, _ = perform(ONE)
+    assert outcome.wait == Wait(2.0, 60.0, "support of cube_01", 1e-6, pytest.approx(0.002))
+    for cube in (stacked(1), untouched(1)):
+        creep = [Mishap("settle", k / 4, move(cube, x=0.00008)) for k in range(200)]
+        short, full = (perform(task, *creep)[0] for task in (ONE, ONE_IN_FULL))
+        assert short.metrics == full.metrics != outcome.metrics
+        assert short.wait == Wait(pytest.approx(51.0), 60.0, ANY, ANY, ANY)
+        assert full.wait == Wait(pytest.approx(60.0), 60.0)
 
 
 def test_the_bounds_of_a_place_belong_to_it() -> None:
@@ -391,16 +406,16 @@ def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
 
 
 def test_the_course_of_one_cube() -> None:
-    _, process = perform(ONE)
+    _, process = perform(ONE_IN_FULL)
     assert list(dict.fromkeys(asked.phase for asked in process.asked)) == [
         *("settle start", "pick cube 1 of 1", "place cube 1 of 1", "check cube 1 of 1"),
         *("retreat cube 1 of 1", "go home", "settle"),
     ]
-    (start,), (check,), (end,) = (
+    (start,), (check,), (end, *more) = (
         in_phase(process, phase) for phase in ("settle start", "check cube 1 of 1", "settle")
     )
     assert (start.kind, start.duration) == ("wait", 0.2)
-    assert (end.kind, end.duration) == ("wait", 60.0)
+    assert sum(asked.duration for asked in (end, *more)) == pytest.approx(60.0)
     opening = in_phase(process, "place cube 1 of 1")[-1]
     assert check.began + check.duration == pytest.approx(opening.began + 0.5)
     home = in_phase(process, "go home")[-1]
@@ -472,6 +487,7 @@ def test_the_studys_rules() -> None:
         finger_closed=0.020,
         speeds=Speeds(1.0, 1.0, 1.0),
         settle=60.0,
+        full_wait=True,
     )
     own = Stacking(1, 2, True, 0.01, 2.0, False, 0.01, Speeds(0.5, 0.5, 0.5), settle=1.0)
     assert own.study() == replace(Stacking().study(), towers=1, levels=2)  # its size stays

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import pytest
 
 from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.panda import panda
+from pytest_simbench.records.notes import Wait
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import Jitter, Outcome, Throwing
 from pytest_simbench.tasks.throwing import perfect_throw
@@ -20,7 +22,7 @@ from tests.tasks.flying import GRAVITY, PROJECTILE, FlyingProcess
 from tests.tasks.scripted import Mishap, drop, move, perform, put
 
 EXACT = Jitter(0.0, 0.0)
-TASK = Throwing(settle=3.0)
+TASK, IN_FULL = Throwing(settle=3.0), Throwing(full_wait=True)
 PERFECT = perfect_throw(panda(), 0.5, True)
 NOTHING_MOVED = {"moved": 0.0, "hit": 0.0, "moved_otherwise": 0.0}
 
@@ -241,7 +243,7 @@ def creep(by: float) -> list[Mishap]:
     return [Mishap("settle", k / 10, move("pyramid_6", y=by / 399)) for k in range(1, 400)]
 
 
-LONG, AWAY = Throwing(settle=40.0), {"pyramid_6": (0.08, 0.0, 0.0)}
+LONG, AWAY = replace(IN_FULL, settle=40.0), {"pyramid_6": (0.08, 0.0, 0.0)}
 
 
 @pytest.mark.parametrize(
@@ -268,10 +270,23 @@ def test_which_cubes_count(
 
 
 def test_it_is_counted_a_minute_after() -> None:
-    outcome, process = thrown(Mishap("settle", 59.9, move("pyramid_1", y=-0.1)), task=Throwing())
+    outcome, process = thrown(Mishap("settle", 59.9, move("pyramid_1", y=-0.1)), task=IN_FULL)
     assert outcome.metrics["moved_otherwise"] == 1.0
     settle = [asked for asked in process.asked if asked.phase == "settle"]
     assert sum(asked.duration for asked in settle) == pytest.approx(60.0)
+
+
+def test_the_wait_ends_when_no_count_can_change_any_more() -> None:
+    """Not while what the throw pushed creeps on: in the end it came farther by itself."""
+    outcome, _ = thrown(task=Throwing(), pushed=AWAY)
+    assert outcome.wait == Wait(2.0, 60.0, "support of projectile", 1e-6, pytest.approx(0.002))
+    creeping = [Mishap("settle", k / 4, move("pyramid_6", y=0.0003)) for k in range(200)]
+    pushed = {"pyramid_6": (0.055, 0.04, 0.0)}
+    for task, push in product((Throwing(), IN_FULL), ({"pyramid_6": (0.0, 0.028, 0.0)}, pushed)):
+        outcome, _ = thrown(*creeping, task=task, pushed=push)
+        assert outcome.metrics["moved"] == (1 / 6 if push is pushed else 0.0)
+        assert outcome.metrics["moved_otherwise"] == (0.0 if push is pushed else 1.0)
+        assert getattr(outcome.wait, "seconds", 0.0) > 50.0
 
 
 def test_the_integrators_part_is_apart() -> None:
@@ -406,7 +421,7 @@ def test_phases_are_named() -> None:
 
 
 def test_the_throw_is_seen_at_every_step_and_the_settling_20_times_a_second() -> None:
-    _, process = thrown()
+    _, process = thrown(task=replace(TASK, full_wait=True))
     waits = [asked for asked in process.asked if asked.kind == "wait"]
     for phase, seconds, period in (("throw", 1.0, 0.0), ("settle", 3.0, 0.05)):
         parts = [asked for asked in waits if asked.phase == phase]
