@@ -25,6 +25,9 @@ from pytest_simbench.tuning.trials import Candidate, Trials
 JOURNAL = "optuna.log"
 """Of the trials, in the run folder: lines of JSON."""
 
+SPENT = "seconds"
+"""What the journal calls the time that the search has taken."""
+
 STARTUP = 10
 """Trials before the sampler learns from them."""
 
@@ -93,8 +96,8 @@ class Search:
             TuningError: no Optuna, nothing that runs, or too little time.
         """
         library = optuna()
-        spent = sum(r.seconds["total"] for r in self._recorded())
-        began = time.monotonic() - spent
+        study = self._study(library)
+        began = time.monotonic() - study.user_attrs.get(SPENT, 0.0)
         today = self.trials.today()
         self.done = [today]
         took = sum(record.seconds["total"] for record in today.records.values())
@@ -103,7 +106,6 @@ class Search:
                 f"{seconds:.0f} s are too few to search: today's settings alone took {took:.0f} s; "
                 f"give a budget of at least {1 + 4 * took / 60:.0f}min"
             )
-        study = self._study(library)
         known = {self._key({}): today}
         number = 0
         begun = sum(trial.state.name != "WAITING" for trial in study.trials)
@@ -122,11 +124,9 @@ class Search:
                 self.tell(known[key], front(self.done, self.trials))
             if trial is not None:
                 study.tell(trial, self._values(known[key], today))
+            study.set_user_attr(SPENT, time.monotonic() - began)
             number += 1
         return self.done
-
-    def _recorded(self) -> Sequence[Any]:
-        return self.trials.resumed.records if self.trials.resumed else ()
 
     def _study(self, library: Any) -> Any:
         storage = library.storages
