@@ -6,13 +6,14 @@ ini file count as always, nothing is simulated, and the claims are those that th
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -28,15 +29,9 @@ from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.tuning.target import Claims
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What a test asks for.
-
-    Attributes:
-        experiment: the task in its case.
-        claims: about metrics of the task.
-        failed: how the test failed nevertheless, in one line; empty where it did not.
-    """
+class Asked(NamedTuple):
+    """The task in its case, claims about its metrics, and how the test failed nevertheless, in one
+    line, or nothing."""
 
     experiment: Experiment
     claims: Claims
@@ -93,19 +88,20 @@ class _Asking(Executor):
         names = {item.name: _ids(item) for item in items}
         items[:] = [item for item in items if not self.ids or self.ids in names[item.name]]
         if len(items) != 1 and names:
-            found = ", ".join(f"[{ids[-1]}]" for ids in names.values())
+            found = ", ".join(f"[{ids[-1]}]" if ids[-1] else n for n, ids in names.items())
             self.told.append(f"it is {'several tests' if items else 'none of these'}: {found}")
             items.clear()
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         if report.failed:
-            self.told.append(_last(str(report.longrepr)))
+            self.told.append(_error(str(report.longrepr), "it cannot be collected"))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.failed or report.skipped:
             crash = getattr(report.longrepr, "reprcrash", None)
             text = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
-            self.told.append(_last(crash.message.split("\n")[0] if crash else str(text)))
+            text = crash.message.partition("\n")[0] if crash else str(text)
+            self.told.append(_error(text, text))
 
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
         if not isinstance(excinfo.value, pytest.exit.Exception):
@@ -135,7 +131,7 @@ def asked(test: str, options: Sequence[str]) -> Asked:
             pytest.main(words, plugins=[asking])
         told = asking.told[0] if asking.told else ""
         if not asking.experiments:
-            lost = told or _said(said.getvalue()) or "it asks for no task: call repeat(task) in it"
+            lost = told or _error(said.getvalue(), "it asks for no task: call repeat(task) in it")
             raise BadInput(f"{test}: {' '.join(lost.split())}")
         claims = RunFolder(out).read().claims
     tasks = [experiment.task for experiment in asking.experiments]
@@ -162,14 +158,6 @@ def _ids(item: pytest.Item) -> tuple[str, ...]:
     return chosen.id, "-".join(part for part in chosen._idlist if part != own)
 
 
-def _last(text: str) -> str:
-    """The error at the end of a text of pytest."""
-    lines = [line for line in text.splitlines() if line.strip()]
-    errors = [line[1:].strip() for line in lines if line.startswith("E  ")]
-    return (errors or lines or [""])[-1]
-
-
-def _said(text: str) -> str:
-    """What pytest complained of, of all that it said."""
-    errors = [line for line in text.splitlines() if line.startswith("ERROR: ")]
-    return errors[0].removeprefix("ERROR: ") if errors else ""
+def _error(text: str, otherwise: str = "") -> str:
+    """The last error in a text of pytest."""
+    return str((re.findall(r"^(?:E  |ERROR: ) *(.*)", text, re.M) or [otherwise])[-1])

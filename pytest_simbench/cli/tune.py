@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from pytest_simbench.cli.asked import asked
 from pytest_simbench.cli.main import INTERRUPTED
@@ -56,18 +57,14 @@ def tune(
     target: str,
     sim: Sequence[str] | None = None,
     profile: Sequence[str] | None = None,
-    settings: Sequence[str] | None = None,
-    cost: str | None = None,
-    error: str | None = None,
     budget: float | None = None,
-    trials: int | None = None,
-    seeds: int | None = None,
-    seed: int | None = None,
     jobs: int | None = None,
     cluster: str | None = None,
     output: str | None = None,
+    **more: Any,
 ) -> int:
-    """Search for each simulator in turn, print, write profile and picture; the exit code.
+    """Search for each simulator in turn, print, write profile and picture; the exit code. `more`
+    are arguments of `_search`.
 
     Raises:
         BadInput, SimulatorError, DataError, ExecutorError: what cannot be; one sentence.
@@ -78,24 +75,26 @@ def tune(
     if len(labels) > 1:
         raise BadInput("give one profile: the search begins with it")
     names, builds = read_names(known() if EVERY in sim else dict.fromkeys(sim), Path.cwd())
-    results, left = [], []
+    several, results, left = len(names) > 1, [], []
     with _executor(jobs, cluster) as (executor, nodes):
         for name in names:
-            if len(names) > 1:
-                print(f"\n{name}", flush=True)
-            out = output if output is None or len(names) == 1 else str(Path(output, name))
+            out = Path(output, name if several else "") if output else None
             chosen = Selection(
                 (name,), ("headless",), labels, pythons=builds, nodes=nodes, named=(name,),
                 files=files,
             )  # fmt: skip
+            options = [
+                f"--sim-name={'='.join(filter(None, (name, builds.get(name))))}",
+                f"--sim-profile={(profile or labels)[0]}",
+                *([f"--sim-cluster={cluster}"] if cluster else []),
+            ]
+            if several:
+                print(f"\n{name}", flush=True)
             try:
-                done = _search(
-                    chosen, executor, target, profile or (USUAL,), settings, cost or "cpu_cost",
-                    error, (budget or BUDGET) / len(names), trials, seeds,
-                    1 if seed is None else seed, out, cluster,
-                )  # fmt: skip
+                seconds = (budget or BUDGET) / len(names)
+                done = _search(chosen, executor, target, options, seconds, out, **more)
             except (BadInput, SimulatorError) as problem:
-                if len(names) == 1:
+                if not several:
                     raise
                 left.append(f"{name} is left out: {problem}")
                 print(for_terminal(left[-1]))
@@ -106,7 +105,7 @@ def tune(
                 results.append(done)
     if not results:
         raise BadInput(f"none of {len(names)} simulators could be tuned")
-    if len(names) > 1:
+    if several:
         print(for_terminal("\n".join(["", *together(results), *left])))
     return 0
 
@@ -130,34 +129,33 @@ def _search(
     chosen: Selection,
     executor: Executor,
     target: str,
-    profile: Sequence[str],
-    settings: Sequence[str] | None,
-    cost: str,
-    error: str | None,
+    options: Sequence[str],
     budget: float,
-    trials: int | None,
-    seeds: int | None,
-    seed: int,
-    output: str | None,
-    cluster: str | None,
+    output: Path | None,
+    settings: Sequence[str] | None = None,
+    cost: str | None = None,
+    error: str | None = None,
+    trials: int | None = None,
+    seeds: int | None = None,
+    seed: int | None = None,
 ) -> Result:
-    """The search of one simulator."""
+    """The search of one simulator; `options` are pytest's for it."""
     check(chosen, makes=False)
     (name,), (label,) = chosen.simulators, chosen.profiles
     case = chosen.case(Variant(name, "headless", label), test="tune", folder=Path())
     of_test, note = None, ""
     if "::" in target:
-        options = [f"--sim-name={name}", f"--sim-profile={profile[0]}"]
-        found = asked(target, options + ([f"--sim-cluster={cluster}"] if cluster else []))
+        found = asked(target, options)
         case = replace(found.experiment.case, trace="off", video="off")
         of_test, note = (found.experiment.asked, found.claims), found.failed
     can = adapter(name).info.capabilities
-    wanted = target_of(target, cost, error, seeds, SEEDS, can, of_test)
+    wanted = target_of(target, cost or "cpu_cost", error, seeds, SEEDS, can, of_test)
     base = chosen.settings(name, label, case.changes)
     space = space_of(base, settings, name)
+    seed = 1 if seed is None else seed
     claims = [f"{metric.name} {claim}" for metric, claim in wanted.claims]
     parts = (name, target, label, wanted.cost, error, seeds, seed, *map(str, space), *claims)
-    path = Path(output) if output else Path(RUNS) / folder_name(parts)
+    path = output or Path(RUNS) / folder_name(parts)
     with closing(_locked(path)) as folder:
         with refusing(RecordError):
             resumed = Resumed(folder) if folder.holds_run else None

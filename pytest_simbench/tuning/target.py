@@ -211,47 +211,38 @@ def target(
         others = [other for law in laws if (other := held_out(law)) is not None]
         halves = (tuple(Look(law, k) for k in TIMES for law in half) for half in (laws, others))
         return Target(name, cost, next(halves), next(halves))
+    task: Task
+    claims: Claims = ()
     if asked:
-        return _of_task(name, cost, asked[0], asked[1], "", error, seeds, judged)
-    if name in REAL:
+        (task, claims), own = asked, ""
+    elif name in REAL:
         kind, data, own = REAL[name]
-        return _of_task(name, cost, kind(read(data)), (), own, error, seeds, judged)
-    if name not in TASKS:
+        task = kind(read(data))
+    elif name in TASKS:
+        make, own = TASKS[name]
+        task = make()
+    else:
         raise TuningError(
             f"nothing to tune for is named {name[:60]!r}; choose from {', '.join((*TASKS, *REAL))},"
             f" laws:NAME,... with {', '.join(PHENOMENA)} or single laws, or FILE.py::TEST"
         )
-    make, own = TASKS[name]
-    return _of_task(name, cost, make(), (), own, error, seeds, judged)
-
-
-def _of_task(
-    name: str, cost: str, task: Task, claims: Claims, own: str, error: str | None,
-    seeds: int | None, judged: int,
-) -> Target:  # fmt: skip
-    """A target that is about a task; see `target`. Its own metric is that of its claims, if they
-    are about one."""
-    first, _, behind = (error or "").partition(":")
-    converged = first == CONVERGED
-    wanted = behind if converged else error or ""
-    halves = _halves(task, seeds, judged)
+    chosen, kept, first = _halves(task, seeds, judged)
     if claims and not error:
-        return Target(name, cost, *halves[:2], None, claims, first_judged=halves[2])
+        return Target(name, cost, chosen, kept, None, claims, first_judged=first)
+    word, _, behind = (error or "").partition(":")
+    converged = word == CONVERGED
     claimed = {metric.name for metric, _ in claims}
-    wanted = wanted or own or (claimed.pop() if len(claimed) == 1 else "")
+    own = own or (claimed.pop() if len(claimed) == 1 else "")
+    wanted = (behind if converged else error) or own
     known = {m.name: m for m in task.metrics}
     fine = [m for m in known.values() if converged or m.better or m.name in task.references]
     if not wanted:
-        option = f"--error {CONVERGED}:" if converged else "--error "
-        raise TuningError(
-            f"{name} claims nothing of {'one' if converged else 'a'} metric to choose by; give "
-            f"{option}METRIC with {', '.join(m.name for m in fine) or 'another test'}"
-        )
+        option = f"--error {CONVERGED}:METRIC" if converged else "--error METRIC"
+        names = ", ".join(m.name for m in fine) or "another test: no metric here has a direction"
+        raise TuningError(f"{name}: name what to choose by, {option} with {names}")
     if known.get(wanted) not in fine:
         raise TuningError(str(UnknownMetric(wanted, [m.name for m in fine])))
-    return Target(
-        name, cost, *halves[:2], known[wanted], converged=converged, first_judged=halves[2]
-    )
+    return Target(name, cost, chosen, kept, known[wanted], converged=converged, first_judged=first)
 
 
 def _halves(

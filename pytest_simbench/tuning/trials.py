@@ -172,7 +172,7 @@ class Trials:
         ahead: dict[Look, Record] = {}
         for k, look in enumerate(looks):
             if look not in ahead:
-                batch = [one for one in looks[k : k + self.executor.jobs] if one.task == look.task]
+                batch = [one for one in looks[k : k + self.executor.jobs] if one.task is look.task]
                 ahead |= self._records(found, batch)
             if look not in ahead:  # another one of them ended all
                 ahead |= self._records(found, [look])
