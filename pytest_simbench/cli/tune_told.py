@@ -145,7 +145,8 @@ def profile_of(of: Result) -> str:
         chosen["motions"] = {task.data: sorted(task.real(seed).number for seed in numbers)}
     else:
         chosen["seeds"] = [[task.name, numbers[0], numbers[-1]]]
-        chosen["judged_from"] = target.first_judged
+        if target.judged:
+            chosen["judged_from"] = target.first_judged + target.judged[0].number - 1
     chosen |= {"versions": dict(record.versions), "commit": _commit()}
     changes = {**case.changes, **found.changes}
     return write_profile(case.base, base_name(case.simulator), changes, chosen)

@@ -155,3 +155,6 @@ def test_starts_of_a_scene_are_not_judged_again(starts: int, halves: tuple[int, 
     assert (len(numbers[0]), len(numbers[1])) == halves
     assert not {*numbers[0]} & {*numbers[1]}
     assert found.first_judged == FIRST_CHOSEN
+    moved = replace(asked[0], moved=0.001), ()
+    found = target("t.py::test_it", "cpu_cost", "converged:tilt", None, 9, asked=moved)
+    assert (len(found.chosen), len(found.judged), found.first_judged) == (4, 9, FIRST_JUDGED)
