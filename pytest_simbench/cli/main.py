@@ -100,18 +100,24 @@ COMMANDS = (
     Subcommand("tune", "cli.tune:tune", "search settings that give this truth for the least cost",
             "It searches for three quarters of the budget, and judges on what it did not search "
             "by. The same command goes on where it was interrupted.", (
-                Argument("target", read.word, "TARGET", "laws:NAME,... (laws or phenomena), "
-                         "stacking, throwing or pushing"),
-                Argument("--sim", read.simulator, "NAME", "whose settings; simbench list "
-                         "--settings NAME prints them"),
+                Argument("target", read.file, "TARGET", "a test, FILE.py::TEST; laws:NAME,... "
+                         "(laws or phenomena); stacking, throwing or pushing; or measured data: "
+                         "tosses, pushes, commands"),
+                Argument("--sim", read.simulators, "NAME,...", "whose settings, or all, one search "
+                         "after the other; simbench list --settings NAME prints them"),
                 Argument("--profile", read.profiles, "NAME|FILE", "today's (default: tuned)"),
                 Argument("--settings", read.words, "NAME,...", "search these alone"),
                 Argument("--cost", read.word, "COST", "default: cpu_cost"),
-                Argument("--error", read.word, "METRIC", "of a task (default: its own)"),
-                Argument("--budget", read.duration, "TIME", "default: 30min"),
+                Argument("--error", read.word, "METRIC", "of a task (default: its own; of a test "
+                         "its claims); converged or converged:METRIC is the distance to an eighth "
+                         "of the time step"),
+                Argument("--budget", read.duration, "TIME", "of all (default: 30min)"),
                 Argument("--trials", read.REPETITIONS, "N", "at most"),
-                Argument("--seeds", read.REPETITIONS, "N", "of a task, to choose by (default: 4)"),
+                Argument("--seeds", read.REPETITIONS, "N", "of a task, to choose by (default: 4; "
+                         "of measured data 24)"),
                 Argument("--seed", read.SEED, "SEED", "of the search (default: 1)"),
+                Argument("--jobs", read.jobs, "N", "seeds of a candidate at once (default: 1)"),
+                Argument("--cluster", read.address, "ADDRESS", "on the nodes of this cluster"),
                 Argument("--output", read.file, "DIR", "folder of the run"),
             )),
     Subcommand("stats", "measure.__main__:main", "print what the suites' claims let pass"),

@@ -111,6 +111,6 @@ def read(name: str, folder: Path | None = None) -> Any:
     if held is None:
         raise DataMissing(
             f"the data set {name} ({found.title}) is not in {folder}: "
-            f"simbench download {name}, or --sim-data DIR"
+            f"simbench download {name}, or --sim-data DIR (simbench: ${VARIABLE})"
         )
     return held

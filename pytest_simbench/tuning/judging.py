@@ -6,7 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pytest_simbench.measure.intervals import Interval, betting, proportion, skewed_t
+from pytest_simbench.measure.intervals import Interval, betting, interval, proportion, skewed_t
+from pytest_simbench.measure.verdicts import Verdict, confidence, judge
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.tuning.target import Look, Target
 from pytest_simbench.tuning.trials import Candidate, Trials, least_costs
@@ -15,7 +16,8 @@ SHARE_MARGIN = 0.05
 """Of shares and of yes or no: 5 points more errors are not worse."""
 
 MARGIN = 0.1
-"""Of other errors: a tenth more is not worse. A law that is kept is right, however well."""
+"""Of other errors: a tenth more, or the smallest difference that means anything, is not worse. A
+law or a claim that is kept is right, however well."""
 
 DEARER = 2.0
 """Times today's cost that the recommended point may have."""
@@ -31,8 +33,10 @@ for the bets."""
 def allowed(target: Target, error: float) -> float:
     """The error up to which a candidate is not worse than one with this error."""
     if target.metric is None:
-        return max(1.0, (1 + MARGIN) * error)
-    return error + (SHARE_MARGIN if target.metric.bounded else MARGIN * error)
+        return max(1.0 if target.laws else 0.0, (1 + MARGIN) * error)
+    if target.metric.bounded:
+        return error + SHARE_MARGIN
+    return error + max(MARGIN * error, target.metric.smallest_difference)
 
 
 def recommended(done: Sequence[Candidate], trials: Trials) -> tuple[Candidate, str]:
@@ -61,7 +65,7 @@ class Judgement:
         verdict: `better`, `not worse`, `worse` or `not shown`.
         looks: laws or seeds behind it.
         before, after: errors.
-        worse_by: by how much the error is larger, with its interval; None of laws.
+        worse_by: by how much the error is larger, with its interval; None of laws and claims.
         cheaper: today's cost over the candidate's, with its interval; None where too few.
         reason: of the verdict.
     """
@@ -78,8 +82,11 @@ class Judgement:
 def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
     """The verdict from the looks that both have had on the held-out half."""
     looks = [look for look in target.judged if look in today.errors and look in found.errors]
-    if target.metric is None:
+    if target.laws:
         looks = [look for look in looks if look.number == 1]
+    if not looks:
+        why = "nothing tells what is right there"
+        return Judgement("not shown", 0, math.nan, math.nan, None, None, why)
     pairs = [(today.errors[look], found.errors[look]) for look in looks]
     before = target.together({look: today.errors[look] for look in looks})
     after = target.together({look: found.errors[look] for look in looks})
@@ -95,7 +102,8 @@ def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
         mean, low, high = (math.exp(value) for value in (of.mean, of.low, of.high))
         cheaper = Interval(mean, low, high, of.n, of.method)
     if target.metric is None:
-        verdict, reason = _of_laws(target, looks, today, found)
+        of_kind = _of_laws if target.laws else _of_claims
+        verdict, reason = of_kind(target, looks, today, found)
         return Judgement(verdict, len(looks), before, after, None, cheaper, reason)
     more = [b - a for a, b in pairs]
     bound = _difference(more, target.metric.bounded)
@@ -125,6 +133,32 @@ def _of_laws(
         f"each of {len(looks)} laws at other parameters is kept, or broken by at most "
         f"{100 * MARGIN:.0f} % more than today"
     )
+
+
+def _of_claims(
+    target: Target, looks: Sequence[Look], today: Candidate, found: Candidate
+) -> tuple[str, str]:
+    """Each claim is judged as a test of pytest judges it, on either's repetitions."""
+    verdicts, told = [], []
+    for metric, claim in target.claims:
+        pair = []
+        for one in (today, found):
+            known = (one.records[look].value(metric) for look in looks)
+            values = [value for value in known if value is not None]
+            pair.append(judge(claim, interval(values, metric, confidence(metric))))
+        old, new = pair
+        verdicts.append((old.verdict, new.verdict))
+        told.append(
+            f"{metric.name} {claim}: {new.verdict} ({significant(new.interval.mean)}), today "
+            f"{old.verdict} ({significant(old.interval.mean)})"
+        )
+    reason = f"{'; '.join(told)}; {len(looks)} seeds"
+    if any(new is Verdict.REFUTED and old is not new for old, new in verdicts):
+        return "worse", reason
+    if any(new is not Verdict.SUPPORTED for _, new in verdicts):
+        return "not shown", reason
+    refuted = any(old is Verdict.REFUTED for old, _ in verdicts)
+    return "better" if refuted else "not worse", reason
 
 
 def _difference(more: Sequence[float], bounded: bool) -> Interval:

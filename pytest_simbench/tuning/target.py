@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy as np
+
+from pytest_simbench.data import pushes, tosses
+from pytest_simbench.data.sets import read
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.laws import LAWS, Law
 from pytest_simbench.laws.held_out import held_out
+from pytest_simbench.measure.verdicts import Bound
 from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.records.phenomena import PHENOMENA
 from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
-from pytest_simbench.tasks import Pushing, Stacking, Throwing
+from pytest_simbench.tasks import ArmFollowing, ArmPushing, Pushing, Stacking, Throwing, Tossing
 from pytest_simbench.tasks.base import Task
+from pytest_simbench.tasks.measured import MeasuredTask
+from pytest_simbench.tasks.on_scene import OnScene
 
 LAWS_WORD = "laws"
 
@@ -24,6 +32,21 @@ TASKS: Mapping[str, tuple[type[Task], str]] = {
     "pushing": (Pushing, "position_error"),
 }
 """Tasks by name, and the metric by which they are chosen where nobody names one."""
+
+REAL: Mapping[str, tuple[Any, str, str]] = {
+    "tosses": (Tossing, tosses.NAME, "position_error"),
+    "pushes": (ArmPushing, pushes.NAME, "displacement_error"),
+    "commands": (ArmFollowing, pushes.NAME, "hand_error"),
+}
+"""Tasks against measured data, the data set, and their metric."""
+
+CONVERGED, FINER = "converged", 8
+"""Error: how far from what today's settings give with the time step divided so."""
+
+CHOSEN, REAL_CHOSEN = 4, 24
+"""Seeds to choose by; of measured motions more, since they differ more."""
+
+Claims = tuple[tuple[Metric, Bound], ...]
 
 FIRST_CHOSEN, FIRST_JUDGED = 300_001, 350_001
 """Seeds of the two halves; runs that name none begin at 10001, and no published one is of them."""
@@ -52,6 +75,9 @@ class Look:
     task: Task
     number: int = 1
 
+    def __hash__(self) -> int:  # a task may hold what has none
+        return hash((self.task.name, self.number))
+
 
 @dataclass(frozen=True)
 class Target:
@@ -61,8 +87,10 @@ class Target:
         name: as it was given.
         cost: name of one of `records.metrics.COSTS`, the less the better.
         chosen, judged: by what candidates are chosen, and what is kept for the verdict.
-        metric: of the task; None for laws.
-        right: the right value of the metric, where it is known.
+        metric: of the task; None for laws and claims.
+        claims: of a test, on its task.
+        converged: whether the metric's right value is that of a smaller time step.
+        first_judged: seed of the judged half's first number.
     """
 
     name: str
@@ -70,68 +98,105 @@ class Target:
     chosen: tuple[Look, ...]
     judged: tuple[Look, ...]
     metric: Metric | None = None
-    right: float | None = None
+    claims: Claims = ()
+    converged: bool = False
+    first_judged: int = FIRST_JUDGED
+
+    @property
+    def laws(self) -> bool:
+        """Whether it is about laws, for which seeds do not matter."""
+        return self.metric is None and not self.claims
 
     @property
     def unit(self) -> str:
         """What an error is told in."""
-        return "tolerances" if self.metric is None else "" if self.metric.bounded else "of it"
+        if self.metric is None:
+            return "limits" if self.claims else "tolerances"
+        return "" if self.metric.bounded else self.metric.unit
 
     @property
-    def deterministic(self) -> bool:
-        """Whether seeds do not matter."""
-        return self.metric is None
+    def word(self) -> str:
+        """Its name for ids: `laws`, `stacking`, `test_insert`."""
+        return self.name.rpartition("::")[2].partition(":")[0].partition("[")[0]
 
-    def error(self, record: Record, today: Record) -> float:
-        """Of one repetition, 0 or more. A law's is told in its tolerance at the step of today's
-        profile, for every candidate: a longer step would be allowed more."""
+    def error(self, look: Look, record: Record, first: Record) -> Any:
+        """Of one repetition, 0 or more; None where nothing tells what is right. Of claims one for
+        each, below 0 on their right side.
+
+        Args:
+            look: whose repetition.
+            record: of it.
+            first: the first record of the look: of a smaller time step, or today's. A law's error
+                is told in its tolerance at the step of today's profile, for every candidate: a
+                longer step would be allowed more.
+        """
+        if self.claims:
+            return tuple(_off(record.value(metric), claim) for metric, claim in self.claims)
         if self.metric is None:
-            mine, theirs = record.notes.reading, today.notes.reading
+            mine, theirs = record.notes.reading, first.notes.reading
             if mine is None:
                 return FAILED
             allowed = theirs.tolerance if theirs else mine.tolerance
             return max(FLOOR, min(FAILED, mine.error / allowed))
-        value = record.value(self.metric)
+        value, right = record.value(self.metric), look.task.references.get(self.metric.name)
+        if self.converged:
+            right = first.value(self.metric) if first.ok else None
+            if right is None or not math.isfinite(right):
+                return None
         if value is None or not math.isfinite(value):
             return FAILED
-        if self.right is not None:
-            return abs(value - self.right)
+        if right is not None:
+            return abs(value - right)
         best = 1.0 if self.metric.bounded and self.metric.better == "higher" else 0.0
         return abs(value - best)
 
-    def together(self, errors: Mapping[Look, float]) -> float:
-        """The error of a candidate from those of its looks; one that has not been had counts as
-        without one. Of a task the mean; of laws the geometric mean of the phenomena's worst."""
-        looks = self.chosen if errors.keys() <= set(self.chosen) else tuple(errors)
-        values = {look: errors.get(look, 0.0) for look in looks}
-        if self.metric is not None:
-            return sum(values.values()) / len(values)
+    def together(self, errors: Mapping[Look, Any], of: Sequence[Look] = ()) -> float:
+        """The error of a candidate from those of its looks; what it has not had of `of` counts as
+        right as can be. Of a task the mean; of claims the mean of the worst, 0 where all are kept;
+        of laws the geometric mean of the phenomena's worst."""
+        values = {**dict.fromkeys(of, (-1.0,) * len(self.claims) or 0.0), **errors}
+        if not self.laws:
+            return float(max(0.0, np.max(np.mean(list(values.values()), axis=0))))
         worst: dict[str, float] = {}
         for look, value in values.items():
-            of = getattr(look.task, "phenomenon", "")
-            worst[of] = max(worst.get(of, FLOOR), value)
+            phenomenon = getattr(look.task, "phenomenon", "")
+            worst[phenomenon] = max(worst.get(phenomenon, FLOOR), value)
         return math.exp(sum(map(math.log, worst.values())) / len(worst))
+
+
+def _off(value: float | None, claim: Bound) -> float:
+    """How far a value is on the wrong side of a limit, in units of the limit (of 0: of the metric);
+    below 0, and at least -1, on the right side."""
+    if value is None or not math.isfinite(value):
+        return FAILED
+    short = claim.value - value if claim.relation == "at least" else value - claim.value
+    return min(FAILED, max(-1.0, short / (abs(claim.value) or 1.0)))
 
 
 def target(
     name: str,
     cost: str,
     error: str | None,
-    seeds: int,
+    seeds: int | None,
     judged: int,
     can: Collection[Capability] = tuple(Capability),
+    asked: tuple[Task, Claims] | None = None,
 ) -> Target:
     """What a command line names.
 
     Args:
-        name: `laws:NAME,...` with phenomena or laws, or the name of a task.
+        name: `laws:NAME,...` with phenomena or laws, the name of a task or of measured data, or a
+            test's.
         cost: of `records.metrics.COSTS`.
-        error: the metric to choose by; None for the task's own.
+        error: the metric to choose by, `converged` or `converged:METRIC`; None for the task's own,
+            or the test's claims.
         seeds, judged: of a task, for choosing and for judging, at most.
         can: what the simulator can do; laws that need more are left out.
+        asked: what a test asks for, see `cli.asked`.
 
     Raises:
         TuningError: there is nothing of that name; lists what there is.
+        DataMissing: the measured data are not here.
     """
     costs = [metric.name for metric in COSTS if metric.better == "lower"]
     if cost not in costs:
@@ -146,20 +211,59 @@ def target(
         others = [other for law in laws if (other := held_out(law)) is not None]
         halves = (tuple(Look(law, k) for k in TIMES for law in half) for half in (laws, others))
         return Target(name, cost, next(halves), next(halves))
-    if name not in TASKS:
+    task: Task
+    claims: Claims = ()
+    if asked:
+        (task, claims), own = asked, ""
+    elif name in REAL:
+        kind, data, own = REAL[name]
+        task = kind(read(data))
+    elif name in TASKS:
+        make, own = TASKS[name]
+        task = make()
+    else:
         raise TuningError(
-            f"nothing to tune for is named {name[:60]!r}; choose from {', '.join(TASKS)}, or "
-            f"laws:NAME,... with {', '.join(PHENOMENA)} or single laws"
+            f"nothing to tune for is named {name[:60]!r}; choose from {', '.join((*TASKS, *REAL))},"
+            f" laws:NAME,... with {', '.join(PHENOMENA)} or single laws, or FILE.py::TEST"
         )
-    make, own = TASKS[name]
-    task = make()
-    known = {metric.name: metric for metric in task.metrics}
-    metric = known.get(error or own)
-    if metric is None or (metric.better is None and metric.name not in task.references):
-        fine = [m.name for m in task.metrics if m.better or m.name in task.references]
-        raise TuningError(str(UnknownMetric(error or own, fine)))
-    looks = [tuple(Look(task, k) for k in range(1, n + 1)) for n in (seeds, judged)]
-    return Target(name, cost, looks[0], looks[1], metric, task.references.get(metric.name))
+    chosen, kept, first = _halves(task, seeds, judged)
+    if claims and not error:
+        return Target(name, cost, chosen, kept, None, claims, first_judged=first)
+    word, _, behind = (error or "").partition(":")
+    converged = word == CONVERGED
+    claimed = {metric.name for metric, _ in claims}
+    own = own or (claimed.pop() if len(claimed) == 1 else "")
+    wanted = (behind if converged else error) or own
+    known = {m.name: m for m in task.metrics}
+    fine = [m for m in known.values() if converged or m.better or m.name in task.references]
+    if not wanted:
+        option = f"--error {CONVERGED}:METRIC" if converged else "--error METRIC"
+        names = ", ".join(m.name for m in fine) or "another test: no metric here has a direction"
+        raise TuningError(f"{name}: name what to choose by, {option} with {names}")
+    if known.get(wanted) not in fine:
+        raise TuningError(str(UnknownMetric(wanted, [m.name for m in fine])))
+    return Target(name, cost, chosen, kept, known[wanted], converged=converged, first_judged=first)
+
+
+def _halves(
+    task: Task, seeds: int | None, judged: int
+) -> tuple[tuple[Look, ...], tuple[Look, ...], int]:
+    """By what it is chosen and judged, and the first seed of the latter. Measured motions have
+    their halves; a scene with a few starts is chosen on the first half of them."""
+
+    def looks(of: Task, first: int, last: int) -> tuple[Look, ...]:
+        return tuple(Look(of, k) for k in range(first, last + 1))
+
+    if isinstance(task, MeasuredTask):
+        measured: Any = task
+        chosen, other = (replace(measured, half=half) for half in ("chosen_on", "held_out"))
+        last = min(seeds or REAL_CHOSEN, chosen.repetitions), min(judged, other.repetitions)
+        return looks(chosen, 1, last[0]), looks(other, 1, last[1]), FIRST_JUDGED
+    if isinstance(task, OnScene) and not getattr(task, "moved", 0.0):
+        many = len(task.world.starts) or 1
+        half = min(seeds or CHOSEN, (many + 1) // 2)
+        return looks(task, 1, half), looks(task, half + 1, min(half + judged, many)), FIRST_CHOSEN
+    return looks(task, 1, seeds or CHOSEN), looks(task, 1, judged), FIRST_JUDGED
 
 
 def _laws(names: Sequence[str]) -> list[Law]:

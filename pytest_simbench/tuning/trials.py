@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,12 +10,20 @@ from pytest_simbench.client.errors import Unavailable, WorkerError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.identity import settings
 from pytest_simbench.experiment.repeater import ProgressLine, Repeater
 from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.laws import Law
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
-from pytest_simbench.tuning.target import FIRST_CHOSEN, FIRST_JUDGED, Look, Target, TuningError
+from pytest_simbench.tuning.target import (
+    CONVERGED,
+    FINER,
+    FIRST_CHOSEN,
+    Look,
+    Target,
+    TuningError,
+)
 
 CHEAPER = 0.9
 """What another candidate may have cost of this one's, so that this one is hopeless: less of a
@@ -44,7 +52,7 @@ class Candidate:
     changes: Mapping[str, Any]
     half: str = ""
     records: dict[Look, Record] = field(default_factory=dict)
-    errors: dict[Look, float] = field(default_factory=dict)
+    errors: dict[Look, Any] = field(default_factory=dict)
     costs: dict[Look, float] = field(default_factory=dict)
     ended: str = ""
 
@@ -76,7 +84,9 @@ class Trials:
     Attributes:
         target: what for.
         case: how repetitions are run, with the settings that the search began with.
-        executor, progress, folder: where, what tells of it, and where records go.
+        executor, progress, folder: where, what tells of it, and where records go. As many looks at
+            a task as the executor has jobs are had at once, and told one after the other: what is
+            had beyond the one that ends a candidate does not count.
         resumed: what an earlier search left in the folder.
         spent: what of it was taken took [s].
     """
@@ -89,7 +99,7 @@ class Trials:
     resumed: Resumed | None = None
     timeout: float | None = None
     spent: float = 0.0
-    _today: dict[Look, Record] = field(default_factory=dict)
+    _first: dict[tuple[str, Look], Record] = field(default_factory=dict)
 
     def today(self) -> Candidate:
         """The settings that the search began with; the time-outs of the others follow.
@@ -98,12 +108,14 @@ class Trials:
             TuningError: every repetition fails.
         """
         found = Candidate("today", {})
-        for look in self.target.chosen:
-            self._look(found, look)
-        if not found.costs:
-            record = next(iter(found.records.values()))
-            why = record.error.message if record.error else "they fail"
-            raise TuningError(f"today's settings cannot be judged: {why:.300}")
+        for one in (*self._finer(""), found):
+            for _ in self._looks(one, self.target.chosen):
+                pass
+            if not (one.costs if one is found else any(r.ok for r in one.records.values())):
+                record = next(iter(one.records.values()))
+                why = record.error.message if record.error else "they fail"
+                what = "today's settings" if one is found else f"{FINER} times as many steps"
+                raise TuningError(f"{what} cannot be judged: {why:.300}")
         took = [record.cost("total") or 0.0 for record in found.records.values()]
         self.timeout = float(max(SHORTEST, round(SLOWER * max(took))))
         return found
@@ -113,8 +125,7 @@ class Trials:
         the same looks at most `CHEAPER` of the cost, and in all an error that this one cannot come
         below, were all its other looks without one; or more repetitions failed than of today's."""
         found = Candidate(name, changes)
-        for look in self.target.chosen:
-            self._look(found, look)
+        for look in self._looks(found, self.target.chosen):
             if found.failed > done[0].failed:
                 error = found.records[look].error
                 found.ended = f"failed: {error.cause if error else 'for no known reason'}"
@@ -129,52 +140,81 @@ class Trials:
         """The candidates on the half that they were not chosen on; in turns, so that a machine that
         slows down slows all."""
         found = [Candidate(one.name, one.changes, "held_out") for one in candidates]
-        for look in looks:
-            for one in found:
-                self._look(one, look)
+        jobs = self.executor.jobs
+        for part in (looks[k : k + jobs] for k in range(0, len(looks), jobs)):
+            for one in (*self._finer("held_out"), *found):
+                for _ in self._looks(one, part):
+                    pass
         return found
+
+    def _finer(self, half: str) -> list[Candidate]:
+        """Today's settings with the smaller time step, where that tells what is right."""
+        if not self.target.converged:
+            return []
+        step = settings(self.case)["timestep"] / FINER
+        return [Candidate(CONVERGED, {"timestep": step}, half)]
 
     def error(self, found: Candidate) -> float:
         """Of what was looked at; of the rest it is taken to be alike, or of laws right."""
-        if self.target.metric is None:
-            return self.target.together(found.errors)
-        return sum(found.errors.values()) / len(found.errors)
+        chosen = self.target.chosen if self.target.laws and not found.half else ()
+        return self.target.together(found.errors, chosen)
 
     def _hopeless(self, found: Candidate, done: Sequence[Candidate]) -> bool:
-        least, looks = self.target.together(found.errors), list(found.costs)
+        chosen, looks = self.target.chosen, list(found.costs)
+        least = self.target.together(found.errors, chosen)
         return bool(looks) and any(
-            self.target.together(other.errors) <= least
+            self.target.together(other.errors, chosen) <= least
             and other.cost(looks) <= CHEAPER * found.cost()
             for other in done
             if not other.ended
         )
 
-    def _look(self, found: Candidate, look: Look) -> None:
-        experiment = Experiment(self._case(found), look.task)
+    def _looks(self, found: Candidate, looks: Sequence[Look]) -> Iterator[Look]:
+        """Have a candidate's looks, one after the other."""
+        ahead: dict[Look, Record] = {}
+        for k, look in enumerate(looks):
+            if look not in ahead:
+                batch = [one for one in looks[k : k + self.executor.jobs] if one.task is look.task]
+                ahead |= self._records(found, batch)
+            if look not in ahead:  # another one of them ended all
+                ahead |= self._records(found, [look])
+            record = found.records[look] = ahead[look]
+            first = self._first.setdefault((found.half, look), record)
+            error = self.target.error(look, record, first)
+            if error is not None:
+                found.errors[look] = error
+            cost = record.cost(self.target.cost) if record.ok else None
+            if cost is not None:
+                found.costs[look] = cost
+            yield look
+
+    def _records(self, found: Candidate, looks: Sequence[Look]) -> dict[Look, Record]:
+        """Of looks at one task: what is recorded, else repetitions; without those that were ended
+        because another one ended all."""
+        task, numbers = looks[0].task, [look.number for look in looks]
+        experiment = Experiment(self._case(found), task)
         if problem := experiment.problem():
             raise TuningError(problem)
         kept = self.resumed.take(experiment, None) if self.resumed else {}
-        if look.number in kept:
-            self.spent += kept[look.number].cost("total") or 0.0
-        else:
+        had = [kept[number].cost("total") or 0.0 for number in numbers if number in kept]
+        self.spent += sum(had) / self.executor.jobs
+        if missing := [number for number in numbers if number not in kept]:
             self.folder.describe(experiment.task)
+            before = len(self.folder.own)
             repeater = Repeater(experiment, self.executor, self.progress, self.folder.append)
             try:
-                kept = {r.repetition: r for r in repeater.run([look.number]).records}
+                repeater.run(missing)
             except Unavailable as error:
                 raise TuningError(error.what) from None
             except WorkerError:  # another world than was asked for: its record tells
-                kept = {look.number: self.folder.own[-1]}
-        record = found.records[look] = kept[look.number]
-        today = self._today.setdefault(look, record)
-        found.errors[look] = self.target.error(record, today)
-        cost = record.cost(self.target.cost) if record.ok else None
-        if cost is not None:
-            found.costs[look] = cost
+                pass
+            made = [r for r in self.folder.own[before:] if r.status != "interrupted"]
+            kept |= {record.repetition: record for record in made}
+        return {look: kept[look.number] for look in looks if look.number in kept}
 
     def _case(self, found: Candidate) -> Case:
         variant = "-".join(filter(None, [found.name, found.half]))
-        function = f"tune_{self.target.name.partition(':')[0]}"
+        function = f"tune_{self.target.word}"
         where = f"{self.case.simulator}-{self.case.mode}"
         return replace(
             self.case,
@@ -182,6 +222,6 @@ class Trials:
             function=function,
             variant=variant,
             changes={**self.case.changes, **found.changes},
-            seed=FIRST_JUDGED if found.half else FIRST_CHOSEN,
-            timeout=None if found.name == "today" else self.timeout,
+            seed=self.target.first_judged if found.half else FIRST_CHOSEN,
+            timeout=self.case.timeout if found.name in ("today", CONVERGED) else self.timeout,
         )

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -44,11 +49,86 @@ def test_a_grip_that_creeps(
     assert "Is a directory" in capsys.readouterr().err
 
 
+TEST = """
+from tests.tiny import Falling
+
+def test_falls(repeat):
+    repeat(Falling()).assert_at_least("landed", 0.9)
+"""
+
+
+def test_a_test_on_several_simulators(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each in a folder of its own; who cannot is told and left out."""
+    for name in ("mujoco", "pybullet"):
+        pytest.importorskip(name)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    Path("test_falls.py").write_text(TEST)
+    words = ("tune", "test_falls.py::test_falls", "--sim", "mujoco,pybullet", "--output", "out")
+    few = ("--trials", "2", "--seeds", "2", "--budget", "30s", "--settings", "timestep,cone")
+    assert main([*words, *few, "--jobs", "2"]) == 0
+    told = capsys.readouterr().out
+    assert "pybullet is left out: pybullet has no setting 'cone' to search" in told
+    assert "claimed: landed at least 0.9" in told
+    table = told[told.index("simulator  cost today") :].splitlines()
+    assert table[1].startswith("mujoco ")
+    made = [*map(json.loads, Path("out/mujoco/records.jsonl").read_text().splitlines())]
+    assert {(r["function"], r["task"]) for r in made} == {("tune_test_falls", "falling")}
+    assert all(r["contended"] for r in made)
+    assert (Path("out/mujoco/records.jsonl").exists(), Path("out/pybullet").exists()) == (1, 0)
+
+
+def test_killed_and_gone_on_with(tmp_path: Path) -> None:
+    """No repetition twice, whatever it was that was killed."""
+    pytest.importorskip("mujoco")
+    (tmp_path / "test_falls.py").write_text(TEST)
+    words = [sys.executable, "-m", "pytest_simbench", "tune", "test_falls.py::test_falls"]
+    words += ["--sim", "mujoco", "--output", "out", "--jobs", "2", "--trials", "4"]
+    words += ["--error", "converged:landed", "--settings", "timestep", "--budget", "40s"]
+    here = {"cwd": tmp_path, "env": {**os.environ, "PYTHONPATH": os.getcwd()}}
+    records = tmp_path / "out/records.jsonl"
+
+    def made() -> list[str]:
+        return records.read_text().splitlines(keepends=True) if records.exists() else []
+
+    first = subprocess.Popen(words, start_new_session=True, stdout=subprocess.DEVNULL, **here)  # type: ignore[call-overload]
+    until = time.monotonic() + 120
+    while len(made()) < 10:
+        assert first.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    os.killpg(first.pid, signal.SIGKILL)
+    first.wait()
+    before = [line for line in made() if line.endswith("\n")]
+    again = subprocess.run(words, check=True, capture_output=True, text=True, **here)  # type: ignore[call-overload]
+    assert f"goes on with {len(before)} repetitions" in again.stdout
+    found = [json.loads(line) for line in made()]
+    assert [json.loads(line) for line in before] == found[: len(before)]
+    assert len({(r["test"], r["repetition"]) for r in found}) == len(found) > len(before)
+    converged = [r for r in found if r["variant"] == "converged"]
+    today = next(r for r in found if r["variant"] == "today")
+    assert len(converged) == 4
+    assert converged[0]["settings"]["timestep"] == today["settings"]["timestep"] / 8
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (("laws:x", "--sim", "mujoco"), "no law or phenomenon is named 'x'"),
         (("stacking",), "name a simulator: --sim NAME"),
+        (("x.py::test_x", "--sim", "mujoco"), "file or directory not found: x.py"),
+        (("stacking", "--sim", "mujoco", "--jobs", "0"), "whole number from 1 to 256, or auto"),
+        (
+            ("stacking", "--sim", "mujoco", "--jobs", "2", "--cluster", "tcp://127.0.0.1:1"),
+            "--cluster: leave out --jobs",
+        ),
+        (
+            ("stacking", "--sim", "mujoco,drake", "--settings", "condim"),
+            "none of 2 simulators could be tuned",
+        ),
+        (("tosses", "--sim", "mujoco"), "simbench download cube_tosses"),
         (("stacking", "--sim", "mujoko"), "unknown simulator 'mujoko'; choose from"),
         (("stacking", "--sim", "mujoco", "--settings", "condim"), "no setting 'condim' to search"),
         (("stacking", "--sim", "mujoco", "--budget", "5"), "give a time: 90s, 30min or 2h"),
@@ -69,6 +149,7 @@ def test_bad_input(
 ) -> None:  # fmt: skip
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SIMBENCH_DATA", str(tmp_path / "none"))
     try:
         status = main(["tune", *words])
     except SystemExit as error:

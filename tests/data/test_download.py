@@ -87,7 +87,7 @@ def test_a_server_that_is_not_there_is_one_sentence(source: Local, tmp_path: Pat
 
 
 def test_a_set_that_is_not_there_says_what_brings_it(tmp_path: Path) -> None:
-    with pytest.raises(DataMissing, match="simbench download cube_tosses, or --sim-data DIR$"):
+    with pytest.raises(DataMissing, match="simbench download cube_tosses, or --sim-data DIR"):
         read("cube_tosses", tmp_path)
 
 

@@ -58,8 +58,8 @@ class Repetition:
 class MadeUp(Executor):
     jobs = 1
 
-    def __init__(self, score: Score) -> None:
-        self.score = score
+    def __init__(self, score: Score, jobs: int = 1) -> None:
+        self.score, self.jobs = score, jobs
         self.asked: list[tuple[str, int]] = []
 
     def repetition(
@@ -73,9 +73,11 @@ def target(chosen: int = 4, judged: int = 6) -> Target:
     return Target("falling", "cpu_cost", halves[0], halves[1], LANDED)
 
 
-def trials(folder: Path, score: Score, of: Target | None = None) -> tuple[Trials, MadeUp]:
+def trials(
+    folder: Path, score: Score, of: Target | None = None, jobs: int = 1
+) -> tuple[Trials, MadeUp]:
     """On MuJoCo's default settings, of 2 ms; a folder that holds a run is gone on with."""
-    executor, place = MadeUp(score), RunFolder(folder)
+    executor, place = MadeUp(score, jobs), RunFolder(folder)
     place.lock()
     resumed = Resumed(place) if place.holds_run else None
     case = Case.of("mujoco", profile="default", test="t", mode="headless", folder=folder)

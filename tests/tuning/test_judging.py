@@ -9,9 +9,11 @@ from typing import Any
 import pytest
 
 from pytest_simbench.laws import LAWS
+from pytest_simbench.measure.verdicts import at_least
 from pytest_simbench.tuning.judging import SEEDS, allowed, judged, recommended
 from pytest_simbench.tuning.target import Look, Target
 from pytest_simbench.tuning.trials import Candidate
+from tests.records.build import record
 
 from .made_up import target, trials
 
@@ -90,3 +92,39 @@ def test_a_law_is_held_against_itself() -> None:
     assert verdict([0.1, 8.0], [0.9, 8.5]) == "not worse"
     assert verdict([0.1, 8.0], [1.2, 0.5]) == "worse"  # one is broken now, whatever the other
     assert verdict([0.1, 8.0], [0.1, 0.5]) == "better"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "verdict"),
+    [
+        ([0.0] * 20, [1.0] * 20, "better"),
+        ([1.0] * 20, [1.0] * 20, "not worse"),
+        ([1.0] * 20, [0.0] * 20, "worse"),
+        ([1.0] * 20, [1.0] * 10 + [0.0] * 10, "not shown"),
+        ([0.0] * 20, [0.0] * 20, "not shown"),
+    ],
+)
+def test_claims_are_judged_as_a_test_judges_them(
+    before: list[float], after: list[float], verdict: str
+) -> None:
+    of = target(1, 20)
+    assert of.metric is not None
+    of = replace(of, metric=None, claims=((of.metric, at_least(0.6)),))
+
+    def with_records(values: list[float], cost: float) -> Candidate:
+        found = candidate(values, cost, of)
+        for look, value in zip(of.judged, values, strict=True):
+            found.records[look] = record(metrics={"landed": value})
+            found.errors[look] = of.error(look, found.records[look], found.records[look])
+        return found
+
+    found = judged(with_records(before, 1.0), with_records(after, 0.5), of)
+    assert found.verdict == verdict
+    assert "landed at least 0.6: " in found.reason
+    assert allowed(of, 0.0) == 0.0  # who keeps them may not break them
+
+
+def test_nothing_to_hold_them_against() -> None:
+    of = target(1, 2)
+    one = Candidate("today", {})
+    assert judged(one, one, of).verdict == "not shown"

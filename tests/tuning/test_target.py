@@ -4,11 +4,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from pytest_simbench.data import Toss, Tosses
 from pytest_simbench.laws import LAWS, Law
 from pytest_simbench.laws.held_out import OTHER, held_out
-from pytest_simbench.tuning.target import TIMES, Look, TuningError, target
+from pytest_simbench.measure.verdicts import at_least, at_most
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.scene import Pose, Scene, Start
+from pytest_simbench.tasks import Settling, Tossing
+from pytest_simbench.tasks.base import cube
+from pytest_simbench.tuning import target as module
+from pytest_simbench.tuning.target import (
+    FIRST_CHOSEN,
+    FIRST_JUDGED,
+    TIMES,
+    Look,
+    TuningError,
+    target,
+)
+from tests.records.build import record
+from tests.tiny import WHITE
 
 from .made_up import LANDED
 from .made_up import target as of_falling
@@ -52,7 +69,9 @@ def test_laws_count_by_phenomenon() -> None:
 
 def test_shares_are_what_is_missing() -> None:
     assert of_falling().metric is LANDED
-    assert of_falling(2).together({Look(of_falling().chosen[0].task, 1): 0.5}) == 0.25
+    of = of_falling(2)
+    assert of.together({of.chosen[0]: 0.5}, of.chosen) == 0.25
+    assert of.together({of.chosen[0]: 0.5}) == 0.5
 
 
 @pytest.mark.parametrize(
@@ -60,12 +79,82 @@ def test_shares_are_what_is_missing() -> None:
     [
         ("laws:x", "cpu_cost", None, "no law or phenomenon is named 'x'; choose from free motion"),
         ("laws:impact", "cpu_cost", "hit", "--error: laws have their own"),
-        ("x", "cpu_cost", None, "is named 'x'; choose from stacking, throwing, pushing, or laws:"),
+        ("x", "cpu_cost", None, "is named 'x'; choose from stacking, throwing, pushing, tosses"),
         ("stacking", "rtf", None, "--cost=rtf: choose from cpu, ram"),
         ("throwing", "cpu_cost", "hits", "did you mean 'hit'"),
         ("throwing", "cpu_cost", "limits", "no metric is named 'limits'"),
+        ("throwing", "cpu_cost", "converged:hits", "did you mean 'hit'"),
+        ("laws:impact", "cpu_cost", "converged", "--error: laws have their own"),
     ],
 )
 def test_bad_names(name: str, cost: str, error: str | None, message: str) -> None:
     with pytest.raises(TuningError, match=message):
         target(name, cost, error, 4, 9)
+
+
+def test_claims_are_of_the_mean() -> None:
+    """The worst in units of its limit; what one seed lacks another one may have over."""
+    landed, late = LANDED, Metric("late", "late", unit="s", better="lower", least=0)
+    of = replace(of_falling(2), metric=None, claims=((landed, at_least(0.5)), (late, at_most(2.0))))
+    first = of.chosen[0]
+
+    def error(*values: tuple[float | None, float]) -> float:
+        records = [record(metrics={"landed": a, "late": b}) for a, b in values]
+        errors = (of.error(first, one, one) for one in records)
+        return of.together(dict(zip(of.chosen, errors, strict=False)), of.chosen)
+
+    assert error((0.25, 0.0), (0.75, 2.0)) == 0.0
+    assert error((0.25, 2.0), (0.5, 2.0)) == pytest.approx(0.25)
+    assert error((0.5, 3.0), (0.5, 5.0)) == pytest.approx(1.0)
+    assert error((0.0, 2.0)) == 0.0  # the other one may make up for it
+    assert error((None, 2.0), (1.0, 2.0)) > 1e5
+    assert (of.laws, of.unit) == (False, "limits")
+
+
+def test_a_limit_of_nought_has_no_unit_of_its_own() -> None:
+    late = Metric("late", "late", unit="s", better="lower", least=0)
+    of = replace(of_falling(1), metric=None, claims=((late, at_most(0.0)),))
+    one = record(metrics={"late": 0.3})
+    assert of.error(of.chosen[0], one, one) == (0.3,)
+
+
+def test_measured_data_have_their_halves(monkeypatch: pytest.MonkeyPatch) -> None:
+    tosses = Tosses(tuple(Toss(k, np.zeros((2, 13))) for k in range(1, 12)))
+    monkeypatch.setattr(module, "read", {"cube_tosses": tosses}.__getitem__)
+    found = target("tosses", "cpu_cost", None, None, 72)
+    assert found.metric is not None
+    assert (found.metric.name, found.first_judged) == ("position_error", FIRST_JUDGED)
+    halves = [
+        {look.task.sample(first + look.number - 1) or ("", -1) for look in looks}
+        for looks, first in ((found.chosen, FIRST_CHOSEN), (found.judged, FIRST_JUDGED))
+    ]
+    assert [{number % 2 for _, number in half} for half in halves] == [{0}, {1}]
+    assert [len(looks) for looks in (found.chosen, found.judged)] == [5, 6]
+
+
+def test_a_test_on_measured_data_has_the_same_halves() -> None:
+    tosses = Tosses(tuple(Toss(k, np.zeros((2, 13))) for k in range(1, 12)))
+    asked = Tossing(tosses), ((Tossing(tosses).metrics[0], at_most(16.0)),)
+    found = target("t.py::test_tossing", "cpu_cost", None, 3, 72, asked=asked)
+    assert [vars(looks[0].task)["half"] for looks in (found.chosen, found.judged)] == [
+        "chosen_on", "held_out",
+    ]  # fmt: skip
+    assert found.claims == asked[1]
+    assert found.word == "test_tossing"
+
+
+@pytest.mark.parametrize(
+    ("starts", "halves"), [(0, (1, 0)), (1, (1, 0)), (5, (3, 2)), (20, (4, 9))]
+)
+def test_starts_of_a_scene_are_not_judged_again(starts: int, halves: tuple[int, int]) -> None:
+    body = cube("c", Pose.at(0.0, 0.0, 0.025), WHITE)
+    scene = Scene("s", (body,), starts=(Start(("c",), (body.pose,)),) * starts)
+    asked = Settling(scene), ()
+    found = target("t.py::test_it", "cpu_cost", "converged:tilt", None, 9, asked=asked)
+    numbers = [[look.number for look in looks] for looks in (found.chosen, found.judged)]
+    assert (len(numbers[0]), len(numbers[1])) == halves
+    assert not {*numbers[0]} & {*numbers[1]}
+    assert found.first_judged == FIRST_CHOSEN
+    moved = replace(asked[0], moved=0.001), ()
+    found = target("t.py::test_it", "cpu_cost", "converged:tilt", None, 9, asked=moved)
+    assert (len(found.chosen), len(found.judged), found.first_judged) == (4, 9, FIRST_JUDGED)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from pytest_simbench.tuning.target import TuningError
 
-from .made_up import trials
+from .made_up import target, trials
 
 
 def test_cost_and_error_are_those_of_the_records(tmp_path: Path) -> None:
@@ -59,4 +62,49 @@ def test_what_is_recorded_is_not_repeated(tmp_path: Path) -> None:
 def test_settings_that_never_work_cannot_be_judged(tmp_path: Path) -> None:
     looks, _ = trials(tmp_path, lambda s, k: None)
     with pytest.raises(TuningError, match="today's settings cannot be judged: it hangs"):
+        looks.today()
+
+
+@pytest.mark.parametrize("jobs", [1, 3, 16])
+def test_the_number_of_jobs_changes_nothing(tmp_path: Path, jobs: int) -> None:
+    """What is had beyond the look that ends a candidate does not count."""
+
+    def score(settings: Mapping[str, Any], number: int) -> float | None:
+        step = settings["timestep"]
+        if step == 0.004:
+            return None
+        return 0.0 if number == 2 and step < 0.002 else 0.5 if number == 3 else 1.0
+
+    looks, executor = trials(tmp_path, score, jobs=jobs)
+    today = looks.today()
+    dear = looks.choose("trial1", {"timestep": 0.001}, [today])
+    bad = looks.choose("trial2", {"timestep": 0.004}, [today])
+    assert (dear.ended, looks.error(dear)) == ("hopeless after 2 of 4", 0.5)
+    assert (bad.ended, looks.error(bad)) == ("failed: WorkerHung in fall", 1.0)
+    (judged,) = looks.judge(dear, looks=looks.target.judged)
+    assert looks.error(judged) == pytest.approx(1.5 / 6)
+    assert len(executor.asked) == len({*executor.asked})
+
+
+def test_what_a_smaller_step_gives_is_right(tmp_path: Path) -> None:
+    """Seed by seed; where it fails nothing tells what is right."""
+
+    def score(settings: Mapping[str, Any], number: int) -> float | None:
+        return None if settings["timestep"] < 0.0003 and number == 2 else 100 * settings["timestep"]
+
+    of = replace(target(), converged=True)
+    looks, executor = trials(tmp_path, score, of)
+    today = looks.today()
+    assert executor.asked[:4] == [("converged", k) for k in (1, 2, 3, 4)]
+    assert looks.error(today) == pytest.approx(0.2 * 7 / 8)
+    assert len(today.errors) == 3
+    (judged,) = looks.judge(today, looks=of.judged)
+    assert looks.error(judged) == pytest.approx(0.2 * 7 / 8)
+    assert {("converged-held_out", 6), ("today-held_out", 6)} < {*executor.asked}
+
+
+def test_a_smaller_step_that_never_works(tmp_path: Path) -> None:
+    of = replace(target(), converged=True)
+    looks, _ = trials(tmp_path, lambda s, k: None if s["timestep"] < 0.001 else 1.0, of)
+    with pytest.raises(TuningError, match="8 times as many steps cannot be judged: it hangs"):
         looks.today()

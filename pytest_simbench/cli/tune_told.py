@@ -1,0 +1,161 @@
+"""What is said of a search: its progress, its front, the verdict, the profile."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from pytest_simbench.ground.text import for_terminal
+from pytest_simbench.ground.versions import base_name
+from pytest_simbench.measure.intervals import Interval
+from pytest_simbench.records.metrics import significant
+from pytest_simbench.simulator.profile_file import write_profile
+from pytest_simbench.simulator.ranges import in_words
+from pytest_simbench.tasks.measured import MeasuredTask
+from pytest_simbench.tuning.judging import Judgement, judged
+from pytest_simbench.tuning.search import front
+from pytest_simbench.tuning.target import FIRST_CHOSEN
+from pytest_simbench.tuning.trials import Candidate, Trials
+
+
+@dataclass(frozen=True)
+class Result:
+    """A search that has ended.
+
+    Attributes:
+        done: its candidates, today's first.
+        found: the recommended one, and why.
+        halves: today's and that one on the held-out half; empty where there is nothing to judge.
+    """
+
+    trials: Trials
+    done: Sequence[Candidate]
+    found: Candidate
+    why: str
+    halves: Sequence[Candidate]
+
+    @cached_property
+    def judgement(self) -> Judgement | None:
+        """On the held-out half, if there is one."""
+        if not (self.halves and self.halves[0].records):
+            return None
+        return judged(self.halves[0], self.halves[1], self.trials.target)
+
+
+def progress(trials: Trials) -> Any:
+    """A line for each candidate that joins the front, and for each tenth."""
+    count = 0
+
+    def tell(one: Candidate, best: Sequence[Candidate]) -> None:
+        nonlocal count
+        count += 1
+        if one in best or count % 10 == 0:
+            least = min(best, key=trials.error)
+            ended = one.ended or ("joins the front" if one in best else "beaten")
+            print(
+                for_terminal(
+                    f"{one.name}: {_point(one, trials)}, {ended}; front of {len(best)}, cheapest "
+                    f"{_point(best[0], trials)}, truest {_point(least, trials)}"
+                ),
+                flush=True,
+            )
+
+    return tell
+
+
+def _point(one: Candidate, trials: Trials) -> str:
+    return f"cost {significant(one.cost())} error {significant(trials.error(one))}"
+
+
+def front_of(of: Result) -> Iterator[str]:
+    """The points that no other beats."""
+    trials, done = of.trials, of.done
+    today, best = done[0], front(done, trials)
+    ended = [one.ended for one in done if one.ended]
+    hopeless = sum(why.startswith("hopeless") for why in ended)
+    yield (
+        f"{len(done) - 1} candidates: {len(ended) - hopeless} failed, {hopeless} were stopped as "
+        f"hopeless; cost is {trials.target.cost}"
+    )
+    rows = [("", "cost", "error", "settings")]
+    for one in [*best, *([] if today in best else [today])]:
+        mark = "recommended" if one is of.found else "today" if one is today else ""
+        changed = (f"{key}={in_words(value)}" for key, value in one.changes.items())
+        error = significant(trials.error(one))
+        rows.append((mark, significant(one.cost()), error, " ".join(changed) or "today's"))
+    yield from _table(rows)
+
+
+def verdict_of(of: Result) -> Iterator[str]:
+    """The recommendation, and what the held-out half says of it."""
+    kept = of.found is of.done[0]
+    yield f"recommended: {'today' if kept else of.found.name}: {of.why}"
+    if (judgement := of.judgement) is None:
+        if not kept:
+            yield "not judged: there are no other parameters of these laws, or no other starts"
+        return
+    cheaper = "cost not told apart"
+    if judgement.cheaper is not None:
+        cheaper = f"cost divided by {_interval(judgement.cheaper)}"
+    worse = f" (more by {_interval(judgement.worse_by)})" if judgement.worse_by else ""
+    yield (
+        f"held-out half: {judgement.verdict}: error {significant(judgement.before)} today, "
+        f"{significant(judgement.after)} then{worse}; {judgement.reason}; {cheaper}"
+    )
+
+
+def together(results: Iterable[Result]) -> Iterator[str]:
+    """A line for each simulator: cost and error on the held-out half, where it is judged."""
+    rows = [("simulator", "cost today", "error", "cost then", "error", "factor", "verdict")]
+    for of in results:
+        known = of.judgement
+        old, new = of.halves if known else (of.done[0], of.found)
+        errors = (known.before, known.after) if known else map(of.trials.error, (old, new))
+        before, after = map(significant, errors)
+        verdict = known.verdict if known else "as today" if old is new else "not judged"
+        costs = significant(old.cost()), significant(new.cost())
+        factor = significant(old.cost() / new.cost())
+        rows.append((of.trials.case.simulator, costs[0], before, costs[1], after, factor, verdict))
+    yield from _table(rows)
+
+
+def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=True)).rstrip()
+
+
+def _interval(of: Interval) -> str:
+    return f"{significant(of.mean)} [{significant(of.low)}, {significant(of.high)}]"
+
+
+def profile_of(of: Result) -> str:
+    """The text of the profile file."""
+    target, case, found = of.trials.target, of.trials.case, of.found
+    record, task = next(iter(found.records.values())), target.chosen[0].task
+    numbers = [look.number + FIRST_CHOSEN - 1 for look in target.chosen]
+    chosen: dict[str, Any] = {"by": f"simbench tune {target.name}", "reason": of.why}
+    if target.laws:
+        chosen["laws"] = list(dict.fromkeys(look.task.name for look in target.chosen))
+    elif isinstance(task, MeasuredTask):
+        chosen["motions"] = {task.data: sorted(task.real(seed).number for seed in numbers)}
+    else:
+        chosen["seeds"] = [[task.name, numbers[0], numbers[-1]]]
+        if target.judged:
+            chosen["judged_from"] = target.first_judged + target.judged[0].number - 1
+    chosen |= {"versions": dict(record.versions), "commit": _commit()}
+    changes = {**case.changes, **found.changes}
+    return write_profile(case.base, base_name(case.simulator), changes, chosen)
+
+
+def _commit() -> str:
+    """Of the working directory, if it is one of git's."""
+    with suppress(OSError):
+        words = ["git", "describe", "--always", "--dirty", "--abbrev=12"]
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
+        return done.stdout.strip()
+    return ""

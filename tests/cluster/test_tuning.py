@@ -1,0 +1,61 @@
+"""A search over settings whose repetitions two nodes carry out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.cli.main import main
+from tests.cluster.machines import Machines
+
+pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
+pytest.importorskip("optuna")
+pytest.importorskip("mujoco")
+
+TEST = """
+import time
+from tests.tiny import Falling
+
+class Slow(Falling):
+    def perform(self, world, seed, count):
+        time.sleep(1.0)
+        return super().perform(world, seed, count)
+
+def test_falls(repeat):
+    repeat(Slow()).assert_at_least("landed", 0.9)
+"""
+
+
+def test_two_nodes_share_one_search(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And it finds what it finds on this machine."""
+    monkeypatch.chdir(tmp_path)
+    Path("test_shared.py").write_text(TEST)
+    words = ["tune", "test_shared.py::test_falls", "--sim", "mujoco", "--trials", "2"]
+    words += ["--settings", "timestep", "--budget", "40s", "--output"]
+    with Machines(tmp_path) as machines:
+        machines.wait("head")
+        for name in ("a", "b"):
+            machines.node(name, "--sim", "mujoco")
+        machines.wait()
+        assert main([*words, "shared", "--cluster", machines.address]) == 0
+    assert main([*words, "here", "--jobs", "2"]) == 0
+    assert "held-out half" in capsys.readouterr().out
+
+    def found(folder: str) -> list[dict[str, object]]:
+        lines = map(json.loads, Path(folder, "records.jsonl").read_text().splitlines())
+        return [r for r in lines if "held_out" not in r["variant"]]
+
+    shared = found("shared")
+    assert {r["host"]["node"] for r in shared} == {"a", "b"}  # type: ignore[index]
+    assert _scores(shared) == _scores(found("here"))
+
+
+def _scores(records: list[dict[str, object]]) -> dict[tuple[object, ...], object]:
+    """By candidate and seed; each is there once."""
+    scores = {(r["variant"], r["seed"]): r["metrics"] for r in records}
+    assert len(scores) == len(records) >= 8
+    return scores
