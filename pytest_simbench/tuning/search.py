@@ -149,7 +149,9 @@ class Search:
         log = isinstance(one.over, Log)
         if one.whole:
             return trial.suggest_int(one.name, int(one.over.low), int(one.over.high), log=log)
-        return float(f"{trial.suggest_float(one.name, one.over.low, one.over.high, log=log):.4g}")
+        value = f"{trial.suggest_float(one.name, one.over.low, one.over.high, log=log):.4g}"
+        own = self._own().get(one.name)  # 1/240 as it is
+        return own if own is not None and f"{own:.4g}" == value else float(value)
 
     def _first(self) -> list[dict[str, Any]]:
         """Today's values, and each with one changed: half-way to either end of its range on its

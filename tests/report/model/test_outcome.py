@@ -14,7 +14,7 @@ import pytest
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import Limit
 from pytest_simbench.report.model.changes import columns
-from pytest_simbench.report.model.outcome import NAME, RunOutcome
+from pytest_simbench.report.model.outcome import NAME, RunOutcome, looks_at
 from tests.report.samples import METRICS, record
 
 
@@ -94,3 +94,11 @@ def test_it_leads_nowhere_else(tmp_path: Path) -> None:
     found, problem = RunOutcome.read(tmp_path / "run")
     assert found == RunOutcome()
     assert "leads out of its folder" in problem
+
+
+def test_a_run_that_was_interrupted_before_anything_ended_was_not_looked_at(tmp_path: Path) -> None:
+    RunOutcome(None, "", None, looks=2).write(tmp_path)
+    interrupted, ended = record(repetition=1, status="interrupted"), record(repetition=2)
+    assert looks_at(tmp_path, [interrupted], [ended]) == 2
+    assert looks_at(tmp_path, [ended], [ended, record(repetition=3)]) == 3
+    assert looks_at(tmp_path, [ended], [ended, interrupted]) == 2
