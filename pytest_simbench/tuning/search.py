@@ -150,7 +150,7 @@ class Search:
         if one.whole:
             return trial.suggest_int(one.name, int(one.over.low), int(one.over.high), log=log)
         value = f"{trial.suggest_float(one.name, one.over.low, one.over.high, log=log):.4g}"
-        own = self._own().get(one.name)  # 1/240 as it is
+        own = own_values(self.space, self.base).get(one.name)  # 1/240 as it is
         return own if own is not None and f"{own:.4g}" == value else float(value)
 
     def _first(self) -> list[dict[str, Any]]:

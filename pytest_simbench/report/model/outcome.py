@@ -102,4 +102,5 @@ def looks_at(folder: Path, before: Iterable[Record], now: Iterable[Record]) -> i
     """How often a run has been judged, with this time: one that ended and to which repetitions were
     added was looked at before."""
     counts = [sum(r.status != "interrupted" for r in records) for records in (before, now)]
-    return RunOutcome.read(folder)[0].looks + ((folder / NAME).exists() and counts[1] > counts[0])
+    again = (folder / NAME).exists() and 0 < counts[0] < counts[1]
+    return RunOutcome.read(folder)[0].looks + again
