@@ -197,7 +197,7 @@ class Trials:
             raise TuningError(problem)
         kept = self.resumed.take(experiment, None) if self.resumed else {}
         had = [kept[number].cost("total") or 0.0 for number in numbers if number in kept]
-        self.spent += sum(had) / self.executor.jobs
+        self.spent += max(had, default=0.0)  # they were had at once
         if missing := [number for number in numbers if number not in kept]:
             self.folder.describe(experiment.task)
             before = len(self.folder.own)

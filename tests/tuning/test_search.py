@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from pytest_simbench.records.folder import RECORDS
-from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.simulator.registry import adapter, address
 from pytest_simbench.tuning.search import Search, front, space_of
 from pytest_simbench.tuning.target import TuningError
 
@@ -72,6 +73,17 @@ def test_it_makes_no_more_trials_than_it_may(tmp_path: Path) -> None:
     one, executor = search(tmp_path)
     one.run(1e9, 3)
     assert {variant for variant, _ in executor.asked} <= {"today", "trial0", "trial1", "trial2"}
+
+
+def test_todays_own_step_is_no_candidate_beside_it(tmp_path: Path) -> None:
+    """Values have four digits, and 1/240 s has more."""
+    pytest.importorskip("optuna")
+    base = adapter("pybullet").profiles["default"]
+    looks, executor = trials(tmp_path, lambda s, k: 1.0)
+    looks.case = replace(looks.case, simulator="pybullet", adapter=address("pybullet") or "")
+    one = Search(looks, base, space_of(base, ["timestep"], "pybullet"), 1, lambda one, best: None)
+    one.run(1e9, 2)
+    assert {variant for variant, _ in executor.asked} == {"today", "trial1"}
 
 
 def test_a_setting_that_does_not_act_is_not_asked_for(tmp_path: Path) -> None:
