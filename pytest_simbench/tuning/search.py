@@ -169,9 +169,9 @@ class Search:
 
     def _step(self, number: int, known: Collection[str]) -> dict[str, Any]:
         """Values where Optuna's sampler hardly comes: in turns those of the point that would be
-        recommended now, of the truest and of any of the front, each with one or two changed to an
-        end of its range, a part of the way there, or another choice; and then of the corners of all
-        ranges a row in which each pair of settings meets as it has not yet."""
+        recommended now, of the truest and of any of the front, each with a choice, or with
+        one or two settings changed to an end of the range or a part of the way there; and then of
+        the corners of all ranges a row in which pairs of settings meet as they have not yet."""
         rng, turn = np.random.default_rng([self.seed, number]), number // 2
         best = front(self.done, self.trials)
         if turn % 4 == 3:
@@ -182,10 +182,12 @@ class Search:
         own = own_values(self.space, self.base, point.changes)
         settings = {**vars(self.base), **point.changes}
         acting = [one for one in self.space if acts(one, settings)]
-        for many in rng.permutation([1, 2]):
-            for _ in range(TRIES):
+        choices = [one for one in acting if not isinstance(one.over, Linear)]
+        for kind in rng.permutation(3):
+            among, many = ((choices, 1), (acting, 1), (acting, 2))[kind]
+            for _ in range(TRIES if among else 0):
                 values = dict(own)
-                for one in rng.permutation(np.array(acting, object))[:many]:
+                for one in rng.permutation(np.array(among, object))[:many]:
                     other = near(own, one)
                     values[one.name] = other[rng.integers(len(other))]
                 if self._key(changes(values, self.base)) not in known:
