@@ -61,7 +61,7 @@ def tune(
     Raises:
         BadInput, SimulatorError: what cannot be; one sentence.
     """
-    chosen, variant = _selected(sim, profile)
+    chosen, variant = selected(sim, profile)
     can = adapter(variant.simulator).info.capabilities
     wanted = target_of(target, cost or "cpu_cost", error, seeds or 4, SEEDS, can)
     name, base = variant.simulator, chosen.settings(variant.simulator, variant.profile)
@@ -69,7 +69,7 @@ def tune(
     budget, seed = budget or BUDGET, 1 if seed is None else seed
     parts = (name, target, variant.profile, wanted.cost, error, seeds, seed, *map(str, space))
     path = Path(output) if output else Path(RUNS) / folder_name(parts)
-    with closing(_locked(path)) as folder, closing(LocalExecutor(1)) as executor:
+    with closing(locked(path)) as folder, closing(LocalExecutor(1)) as executor:
         with refusing(RecordError):
             resumed = Resumed(folder) if folder.holds_run else None
         case = chosen.case(variant, test="tune", folder=path)
@@ -101,7 +101,7 @@ def tune(
     return 0
 
 
-def _selected(sim: str | None, profile: Sequence[str] | None) -> tuple[Selection, Variant]:
+def selected(sim: str | None, profile: Sequence[str] | None) -> tuple[Selection, Variant]:
     if sim is None:
         raise BadInput("name a simulator: --sim NAME (simbench list tells which there are)")
     labels, files = profiles_of(profile or (USUAL,))
@@ -112,7 +112,7 @@ def _selected(sim: str | None, profile: Sequence[str] | None) -> tuple[Selection
     return chosen, Variant(sim, "headless", labels[0])
 
 
-def _locked(path: Path) -> RunFolder:
+def locked(path: Path) -> RunFolder:
     folder = RunFolder(path)
     with refusing(FolderError):
         folder.lock()

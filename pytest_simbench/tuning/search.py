@@ -251,6 +251,6 @@ def front(done: Sequence[Candidate], trials: Trials) -> list[Candidate]:
     return found
 
 
-def folder_name(parts: Sequence[object]) -> str:
+def folder_name(parts: Sequence[object], word: str = "tune") -> str:
     """Of the run folder of a search: the same for the same search."""
-    return file_name("tune-" + "-".join(map(str, parts[:2])), *parts[2:])
+    return file_name(f"{word}-" + "-".join(map(str, parts[:2])), *parts[2:])

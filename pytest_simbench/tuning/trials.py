@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from pytest_simbench.client.errors import Unavailable, WorkerError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repeater import ProgressLine, Repeater
+from pytest_simbench.experiment.repeater import ProgressLine
 from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.laws import Law
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
+from pytest_simbench.tuning.runs import Runs
 from pytest_simbench.tuning.target import FIRST_CHOSEN, FIRST_JUDGED, Look, Target, TuningError
 
 CHEAPER = 0.9
@@ -149,19 +149,8 @@ class Trials:
 
     def _look(self, found: Candidate, look: Look) -> None:
         experiment = Experiment(self._case(found), look.task)
-        if problem := experiment.problem():
-            raise TuningError(problem)
-        kept = self.resumed.take(experiment, None) if self.resumed else {}
-        if look.number not in kept:
-            self.folder.describe(experiment.task)
-            repeater = Repeater(experiment, self.executor, self.progress, self.folder.append)
-            try:
-                kept = {r.repetition: r for r in repeater.run([look.number]).records}
-            except Unavailable as error:
-                raise TuningError(error.what) from None
-            except WorkerError:  # another world than was asked for: its record tells
-                kept = {look.number: self.folder.own[-1]}
-        record = found.records[look] = kept[look.number]
+        runs = Runs(self.executor, self.progress, self.folder, self.resumed)
+        record = found.records[look] = runs.record(experiment, look.number)
         today = self._today.setdefault(look, record)
         found.errors[look] = self.target.error(record, today)
         cost = record.cost(self.target.cost) if record.ok else None
