@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pytest_simbench.cli.main import INTERRUPTED
 from pytest_simbench.cli.runs import RUNS, printed
-from pytest_simbench.cli.tune import BUDGET, locked, selected
+from pytest_simbench.cli.tune import BUDGET, aligned, locked, selected
 from pytest_simbench.cli.values import BadInput, refusing
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
@@ -102,10 +102,7 @@ def _lines(results: Sequence[Told], fitting: Fit, found: State) -> Iterator[str]
         ends = f"{significant(one.low, 4)} to {significant(one.high, 4)}"
         determined = (significant(one.value, 4), ends) if not one.why else ("not determined", "")
         rows.append((one.unknown.name, *determined, significant(one.unknown.value, 4), one.why))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=True)).rstrip()
-    yield ""
+    yield from (*aligned(rows), "")
     assert fitting.first is not None  # it was looked at
     for metric in Fitting(fitting.scene, fitting.log).metrics:
         values = fitting.first.metrics.get(metric.name), found.record.metrics[metric.name]
@@ -118,9 +115,8 @@ def _lines(results: Sequence[Told], fitting: Fit, found: State) -> Iterator[str]
 
 def _written(results: Sequence[Told]) -> str:
     rows = {
-        one.unknown.name: {"why": one.why}
-        if one.why
-        else {"value": one.value, "low": one.low, "high": one.high}
+        one.unknown.name: {"value": one.value, "low": one.low, "high": one.high}
         for one in results
+        if not one.why
     }
     return json.dumps(rows, indent=1) + "\n"

@@ -170,6 +170,11 @@ def _front(done: Sequence[Candidate], found: Candidate, trials: Trials) -> Itera
         changed = (f"{key}={in_words(value)}" for key, value in one.changes.items())
         error = significant(trials.error(one))
         rows.append((mark, significant(one.cost()), error, " ".join(changed) or "today's"))
+    yield from aligned(rows)
+
+
+def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    """Rows of a table, its columns one below the other."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=True)).rstrip()

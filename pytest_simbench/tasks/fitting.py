@@ -7,13 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.world import World
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.scene import Body, Compound, FloatArray, Pose
+from pytest_simbench.scene import Compound, FloatArray, Pose
 from pytest_simbench.tasks.base import Count, Outcome
 from pytest_simbench.tasks.on_scene import OnScene
 from pytest_simbench.tasks.replaying import Log
@@ -44,22 +43,19 @@ class Fitting(OnScene):
     @property
     def metrics(self) -> tuple[Metric, ...]:
         doc = "off the log, root mean square over all times and joints or bodies"
-        units = {unit: unit for unit in self._units.values()}
         return tuple(
             Metric(name, f"{kind} off the log", unit=unit, better="lower", least=0, doc=doc)
             for name, kind, unit in (("off", "places", "mm"), ("turned", "angles", "deg"))
-            if unit in units
+            if unit in self._units.values()
         )
 
     @property
     def _units(self) -> dict[str, str]:
-        """By columns of the residuals: those of joints, and of each body's place and turn."""
+        """By columns of the residuals: joints, and places of bodies."""
         robot = self.world.robot
         kinds = {} if robot is None else {j.name: j.kind for j in PreparedRobot(robot).joints}
         found = {name: "mm" if kinds[name] == "prismatic" else "deg" for name in self.log.joints}
-        for name in self.log.start.bodies:
-            found |= {f"{name}/place": "mm", f"{name}/turn": "deg"}
-        return found
+        return found | {f"{name}/place": "mm" for name in self.log.start.bodies}
 
     def parameters(self) -> dict[str, Any]:
         own = {f"task.{name}": value for name, value in self.values.items()}
@@ -83,8 +79,8 @@ class Fitting(OnScene):
         return Outcome(metrics, {"residuals": {k: v.round(9).tolist() for k, v in found.items()}})
 
     def residuals(self, motion: Motion, began: float = 0.0) -> dict[str, FloatArray]:
-        """Of a motion minus the log, by column, (rows, 1 or 3) [m or rad]; a turn is a vector in
-        the world frame."""
+        """Of a motion minus the log, by column, (rows, 1 or 3) [m or rad]. Of bodies their centres
+        of mass; how contacts turn them is left out, which no engine repeats."""
         seen, time = self.log.seen, motion.time - began
         rows = slice(None, None, -(-len(seen["time"]) // MOST))
         at, found = seen["time"][rows], {}
@@ -96,27 +92,10 @@ class Fitting(OnScene):
         for name in self.log.joints:
             joint = motion.joints[:, 0, [names.index(name)]]
             found[name] = sampled(joint) - seen[name][rows, None]
-        bodies = {body.name: (k, body) for k, body in enumerate(self.world.free_bodies)}
-        for name in self.log.start.bodies:
-            k, body = bodies[name]
-            place, turn = _placed(sampled(_continuous(motion.bodies[:, k, :7])), body)
-            logged = seen[f"{name}/pose"][rows]
-            found[f"{name}/place"] = place - logged[:, :3]
-            before = Rotation.from_quat(logged[:, 3:], scalar_first=True)
-            found[f"{name}/turn"] = (turn * before.inv()).as_rotvec()
+        for k, body in enumerate(self.world.free_bodies):
+            if body.name in self.log.start.bodies:
+                frame = body.file_frame if isinstance(body, Compound) else Pose()
+                poses = map(Pose.from_array, seen[f"{body.name}/pose"][rows])
+                logged = np.array([(pose * frame.inverse()).position for pose in poses])
+                found[f"{body.name}/place"] = sampled(motion.bodies[:, k, :3]) - logged
         return found
-
-
-def _continuous(poses: FloatArray) -> FloatArray:
-    """The same poses, (n, 7), no quaternion with the sign opposite to that of the one before."""
-    flips = np.sign(np.sum(poses[1:, 3:] * poses[:-1, 3:], axis=1))
-    signs = np.concatenate([[1.0], np.cumprod(np.where(flips < 0, -1.0, 1.0))])
-    return np.concatenate([poses[:, :3], poses[:, 3:] * signs[:, None]], axis=1)
-
-
-def _placed(poses: FloatArray, body: Body) -> tuple[FloatArray, Rotation]:
-    """Places and turns of the frame that its file gives a body."""
-    frame = body.file_frame if isinstance(body, Compound) else Pose()
-    turn = Rotation.from_quat(poses[:, 3:], scalar_first=True)
-    own = Rotation.from_quat(frame.quaternion, scalar_first=True)
-    return poses[:, :3] + turn.apply(frame.position), turn * own

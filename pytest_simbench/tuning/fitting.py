@@ -15,9 +15,8 @@ from scipy.stats import qmc
 from pytest_simbench.records.record import Record
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.tasks import Fitting, Log
-from pytest_simbench.tuning.beginnings import begun, starts
 from pytest_simbench.tuning.target import TuningError
-from pytest_simbench.tuning.unknowns import Unknown, changed
+from pytest_simbench.tuning.unknowns import Unknown, begun, changed, starts
 
 COARSE = 4
 """Points over the ranges, for each unknown, and one more."""
@@ -28,14 +27,14 @@ RESTARTS = 3
 STEP = 0.02
 """Of an unknown's logarithm, for differences: contacts make smaller ones rough."""
 
-START_STEP = 0.1
-"""The same of the starts of joints, in `beginnings.UNIT`."""
+UNIT, START_STEP = 0.01, 0.1
+"""Of the starts of joints [rad or m]; the same of them, in that unit."""
 
 ITERATIONS, TRIES = 12, 4
 """Of the method, and of its damping in each."""
 
 FAR = 1.0, 5.0
-"""Of a step: of an unknown's logarithm, and of the start of a joint in `beginnings.UNIT`."""
+"""Of a step: of an unknown's logarithm, and of the start of a joint in `UNIT`."""
 
 ENOUGH = 0.05
 """What a further step may gain [the log of the likelihood]: a third of a standard error."""
@@ -141,22 +140,18 @@ class Fit:
         """At a point; None where it cannot be simulated."""
         logs, begin = np.split(point, [len(self.unknowns)])
         values = {one.name: math.exp(x) for one, x in zip(self.unknowns, logs, strict=True)}
-        scene = changed(self._begun, values)
-        for move, x in zip(self.starts.values(), begin, strict=True):
-            scene = move(scene, float(x))
-        record = self.run(Fitting(scene, self.log, values), f"e{self.looks}")
+        for (name, start), x in zip(self.starts.items(), begin, strict=True):
+            values[name] = start + UNIT * float(x)
+        task = Fitting(changed(self._begun, values), self.log, values)
+        record = self.run(task, f"e{self.looks}")
         self.looks += 1
         self.first = self.first or record
         if not record.ok:
             return None
         columns = {name: np.array(rows) for name, rows in record.details["residuals"].items()}
-        for name in [name for name in columns if "/" in name]:
-            body, _, part = name.partition("/")
-            # Where a body begins is known no better than where it is later.
-            columns[name] -= columns[name].mean(axis=0)
-            # Contacts turn bodies in ways that no log repeats.
-            if part == "turn" and f"angular_damping:{body}" not in values:
-                del columns[name]
+        for name in columns:  # where a body begins is known no better than where it is later
+            if "/" in name:
+                columns[name] -= columns[name].mean(axis=0)
         return State(point, columns, record)
 
     def _coarse(self) -> list[State]:

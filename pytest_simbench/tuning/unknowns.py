@@ -7,11 +7,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from pytest_simbench.description.robot_files import description_xml, keep
-from pytest_simbench.description.urdf import INERTIA
-from pytest_simbench.scene import Robot, Scene
+from pytest_simbench.description.urdf import INERTIA, PreparedRobot
+from pytest_simbench.scene import Robot, Scene, Start
 from pytest_simbench.scene.robot import FREE
 from pytest_simbench.tasks import Log
+from pytest_simbench.tasks.base import distance
+from pytest_simbench.tasks.on_scene import started
 from pytest_simbench.tuning.target import TuningError
 
 GROUND = "ground"
@@ -31,6 +35,13 @@ OF_JOINTS = {
 
 FACTOR = 10.0
 """From the scene's value to either end of a range that nobody names."""
+
+START = "start"
+"""Kind of what is sought beside the unknowns: where a joint begins [rad or m]."""
+
+NEAR = 0.005
+"""A body begins where the scene has it, if the log has it within this [m]; else where the log has
+it, noise and all."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +152,10 @@ def _changed(scene: Scene, kind: str, name: str, value: float) -> Scene:
     if kind in OF_BODIES:
         whole = replace(robot, friction=value) if kind == "friction" else _heavy(robot, name, value)
         return replace(scene, robot=whole)
-    of_joint: dict[str, Any] = {OF_JOINTS[kind]: value}
+    of_joint: dict[str, Any] = {OF_JOINTS.get(kind, kind): value}
+    if kind == START:
+        ends = PreparedRobot(robot).limits[name]
+        of_joint = {"initial_position": float(np.clip(value, *ends))}
     joints = tuple(replace(j, **of_joint) if j.name == name else j for j in robot.joints)
     return replace(scene, robot=replace(robot, joints=joints))
 
@@ -163,3 +177,22 @@ def _inertials(xml: ET.Element) -> Iterator[tuple[str, ET.Element]]:
         inertial = link.find("inertial")
         if inertial is not None and inertial.find("mass") is not None:
             yield link.get("name", ""), inertial
+
+
+def begun(scene: Scene, log: Log) -> Scene:
+    """The scene as it is where the log begins."""
+    own, start = started(scene), log.start
+    logged = zip(start.bodies, start.poses, strict=True)
+    moved = {name: pose for name, pose in logged if distance(own[name], pose) > NEAR}
+    there = Start(tuple(moved), tuple(moved.values()), start.positions)
+    return replace(scene.at_start(there), starts=())
+
+
+def starts(scene: Scene, log: Log) -> dict[str, float]:
+    """Where joints begin is measured no better than the rest, so it is sought too, unless others
+    move with them. By name, as unknowns have it."""
+    if scene.robot is None or scene.robot.closures:
+        return {}
+    coupled = {name for c in scene.robot.couplings for name in (c.follower, c.leader)}
+    positions = {joint.name: joint.initial_position for joint in scene.robot.joints}
+    return {f"{START}:{name}": positions[name] for name in log.joints if name not in coupled}

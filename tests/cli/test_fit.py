@@ -82,7 +82,7 @@ def test_the_mass_and_both_gains_are_not_told_apart(
     assert "the log tells its ratio to stiffness:hinge and damping:hinge alone" in (
         capsys.readouterr().out
     )
-    assert {*json.loads((folder / "out/fitted.json").read_text())["mass:rod"]} == {"why"}
+    assert json.loads((folder / "out/fitted.json").read_text()) == {}
 
 
 @pytest.mark.engine

@@ -11,7 +11,7 @@ from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.scene import Box, Pose, Start, Trajectory
 from pytest_simbench.tasks import Log
 from pytest_simbench.tuning.target import TuningError
-from pytest_simbench.tuning.unknowns import Unknown, changed, known, unknowns
+from pytest_simbench.tuning.unknowns import Unknown, begun, changed, known, starts, unknowns
 from tests.tasks.scripted_scene import SCENE
 
 BLOCK = Box("block", (0.1, 0.1, 0.1), Pose.at(1, 0, 0.05), 2.0, 0.5, moments=(0.1, 0.2, 0.3))
@@ -64,3 +64,15 @@ def test_what_cannot_be_sought_is_one_sentence(texts: list[str], why: str) -> No
     with pytest.raises(TuningError, match=why) as raised:
         unknowns(texts, WHOLE, LOG)
     assert "\n" not in str(raised.value)
+
+
+def test_a_scene_begins_where_the_log_does_but_bodies_that_stand_there_stay() -> None:
+    near, far = Pose.at(1.003, 0, 0.05), Pose.at(1.5, 0, 0.06)
+    for pose, wanted in ((near, BLOCK.pose), (far, far)):
+        log = replace(LOG, start=Start(("block",), (pose,), (0.25, 0.5)))
+        scene = begun(replace(WHOLE, starts=(NOTHING,)), log)
+        assert (scene.body("block").pose, scene.starts) == (wanted, ())
+        assert starts(scene, log) == {"start:hinge": 0.25}
+        moved = changed(scene, {"start:hinge": 7.0}).robot
+        assert moved is not None
+        assert moved.column("initial_position").tolist() == [1.0, 0.5]  # its limit
