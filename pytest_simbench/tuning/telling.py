@@ -50,16 +50,18 @@ def told(fit: Fit, at: State) -> Iterator[Told]:
     names = [one.name for one in fit.unknowns] + list(fit.starts)
     for k, one in enumerate(fit.unknowns):
         x, low, high, why = at.point[k], fit.low[k], fit.high[k], ""
-        alone = factor / math.sqrt(known[k, k] + 1e-9)
+        alone, half = factor / math.sqrt(known[k, k] + 1e-9), factor * sd[k]
         at_end = float(np.linalg.norm(at.slopes[:, k])) > factor / WIDE
         at_end = at_end and not low + 1e-6 < x < high - 1e-6
+        together = half > max(WIDE, 2 * alone)
         alone = alone if at_end else fit.widened(at, k, alone)
-        half = max(alone, factor * sd[k])
-        if at_end:
+        half = max(alone, half)
+        open_ = [w > WIDE or not (at_end or low < x - w < x + w < high) for w in (alone, half)]
+        if at_end and not together:
             why = "the best lies at the end of its range: give a wider one"
-        elif alone > WIDE or not low < x - alone < x + alone < high:
+        elif open_[0]:
             why = "what was measured hardly depends on it, or jumps about as it changes"
-        elif half > WIDE or not low < x - half < x + half < high:
+        elif open_[1]:
             linked = cov[k] / (sd[k] * sd)
             linked[k] = 0.0
             least = min(LINKED, np.abs(linked).max())
