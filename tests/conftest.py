@@ -106,6 +106,7 @@ SLOW = {
     "test_other_seeds_and_many_tests_do_not_hide_crashes",
     "test_pictures_stay_in_their_folder",
     "test_planted_changes_are_found_where_they_are",
+    "test_planted_values_are_found_and_intervals_cover",
     "test_shrinks_to_the_smallest_amount",
     "test_the_file_has_what_the_command_finds",
     "test_the_order_of_the_cubes_is_by_seed",

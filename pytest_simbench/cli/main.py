@@ -30,6 +30,7 @@ class Argument(NamedTuple):
     metavar: str
     help: str
     nargs: str | None = None
+    action: str | None = None
 
 
 class Subcommand(NamedTuple):
@@ -118,6 +119,21 @@ COMMANDS = (
                 Argument("--seed", read.SEED, "SEED", "of the search (default: 1)"),
                 Argument("--jobs", read.jobs, "N", "seeds of a candidate at once (default: 1)"),
                 Argument("--cluster", read.address, "ADDRESS", "on the nodes of this cluster"),
+                Argument("--output", read.file, "DIR", "folder of the run"),
+            )),
+    Subcommand("fit", "cli.fit:fit", "find numbers of a scene that a log of it tells",
+            "It says how well, and what the log does not tell. The same command goes on where it "
+            "was interrupted.", (
+                Argument("scene", read.file, "SCENE", "an MJCF or URDF file"),
+                Argument("log", read.file, "LOG", ".npz, .csv or .mcap"),
+                Argument("--sim", read.simulator, "NAME", "the simulator"),
+                Argument("--profile", read.profiles, "NAME|FILE", "its settings (default: tuned)"),
+                Argument("--unknown", read.words, "KIND:NAME,...", "what is sought: "
+                         "friction:block, or with its range friction:block=0.1..1; may come "
+                         "several times", action="append"),
+                Argument("--noise", read.NOISE, "SD", "of what was measured, in m and rad "
+                         "(default: told by the residuals)"),
+                Argument("--budget", read.duration, "TIME", "default: 30min"),
                 Argument("--output", read.file, "DIR", "folder of the run"),
             )),
     Subcommand("stats", "measure.__main__:main", "print what the suites' claims let pass"),

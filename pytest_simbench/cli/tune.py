@@ -39,6 +39,7 @@ from pytest_simbench.report.figures.front import draw
 from pytest_simbench.report.files import shown
 from pytest_simbench.simulator.registry import adapter, known
 from pytest_simbench.tuning.judging import SEEDS, recommended
+from pytest_simbench.tuning.runs import Runs
 from pytest_simbench.tuning.search import Search, folder_name, front, space_of
 from pytest_simbench.tuning.target import target as target_of
 from pytest_simbench.tuning.trials import Candidate, Trials
@@ -156,11 +157,11 @@ def _search(
     claims = [f"{metric.name} {claim}" for metric, claim in wanted.claims]
     parts = (name, target, label, wanted.cost, error, seeds, seed, *map(str, space), *claims)
     path = output or Path(RUNS) / folder_name(parts)
-    with closing(_locked(path)) as folder:
+    with closing(locked(path)) as folder:
         with refusing(RecordError):
             resumed = Resumed(folder) if folder.holds_run else None
         case = replace(case, folder=path)
-        looks = Trials(wanted, case, executor, printed(True), folder, resumed)
+        looks = Trials(wanted, case, Runs(executor, printed(True), folder, resumed))
         search = Search(looks, base, space, seed, progress(looks))
         over = ", ".join(dict.fromkeys(one.setting for one in space))
         print(for_terminal(f"{target} on {name}, from its profile {label}; over {over}"))
@@ -188,7 +189,7 @@ def _search(
     return result
 
 
-def _locked(path: Path) -> RunFolder:
+def locked(path: Path) -> RunFolder:
     folder = RunFolder(path)
     with refusing(FolderError):
         folder.lock()

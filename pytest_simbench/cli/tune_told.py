@@ -87,7 +87,7 @@ def front_of(of: Result) -> Iterator[str]:
         changed = (f"{key}={in_words(value)}" for key, value in one.changes.items())
         error = significant(trials.error(one))
         rows.append((mark, significant(one.cost()), error, " ".join(changed) or "today's"))
-    yield from _table(rows)
+    yield from aligned(rows)
 
 
 def verdict_of(of: Result) -> Iterator[str]:
@@ -120,10 +120,11 @@ def together(results: Iterable[Result]) -> Iterator[str]:
         costs = significant(old.cost()), significant(new.cost())
         factor = significant(old.cost() / new.cost())
         rows.append((of.trials.case.simulator, costs[0], before, costs[1], after, factor, verdict))
-    yield from _table(rows)
+    yield from aligned(rows)
 
 
-def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Rows of a table, its columns one below the other."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=True)).rstrip()

@@ -1,7 +1,9 @@
-"""Logs of a robot's joints, for a scene to follow (`tasks.Replaying`): `.npz`, `.csv`, `.mcap`.
+"""Logs of joints and bodies, for a scene to follow or to be fitted to (`tasks.Replaying`,
+`tasks.Fitting`): `.npz`, `.csv`, `.mcap`.
 
     time              [s], (n,)
     NAME              positions of that joint [rad or m]; NAME/velocity and NAME/effort besides
+    NAME/command      what its drive was told, where that is known; else it is told NAME
     NAME/pose         of that free body, (n, 7), as in a file of starts; not in `.csv`
 
 An `.npz` file may have `position`, `velocity` and `effort` (n, joints) instead, in the order of the
@@ -53,8 +55,10 @@ def read_log(path: str | Path, scene: Scene) -> Log:
     read = READERS.get(path.suffix.lower())
     if read is None:
         raise DescriptionError(f"{path} is no log; give {', '.join(READERS)}")
-    if scene.robot is None or not scene.robot.joints:
-        raise DescriptionError(f"{path}: scene {scene.name!r} has no joints, so none follow a log")
+    if scene.robot is None and not scene.free_bodies:
+        raise DescriptionError(
+            f"{path}: scene {scene.name!r} has no joints and no free bodies, so no log is of it"
+        )
     try:
         return _log(read(path, scene), scene, scene.robot)
     except (FileError, BagsUnavailable) as error:
@@ -63,13 +67,13 @@ def read_log(path: str | Path, scene: Scene) -> Log:
         raise DescriptionError(f"the log {path} {error}") from None
 
 
-def _log(columns: Columns, scene: Scene, robot: Robot) -> Log:
+def _log(columns: Columns, scene: Scene, robot: Robot | None) -> Log:
     """With a regular time, in steps of about the median of the log's.
 
     Raises:
         ValueError: columns that do not fit the scene.
     """
-    joints, parts = robot.joint_names, ("", "/velocity", "/effort")
+    joints, parts = robot.joint_names if robot else (), ("", "/velocity", "/effort", "/command")
     places = {name + part: (p, k) for p, part in enumerate(parts) for k, name in enumerate(joints)}
     bodies = {f"{body.name}/pose": body.name for body in scene.free_bodies}
     time = _numbers("time", columns.pop("time", np.zeros(0)))
@@ -82,9 +86,10 @@ def _log(columns: Columns, scene: Scene, robot: Robot) -> Log:
     if not SHORTEST <= lasts <= LONGEST:
         raise ValueError(f"lasts {lasts:g} s; {SHORTEST:g} to {LONGEST:g} s are read")
     grid = np.linspace(0.0, lasts, max(1, round(lasts / max(np.median(steps), FINEST))) + 1)
-    rows, digest = np.zeros((3, len(grid), len(joints))), hashlib.sha256(time.tobytes())
-    rows[0] = robot.column("initial_position")
+    rows, digest = np.zeros((4, len(grid), len(joints))), hashlib.sha256(time.tobytes())
+    rows[0] = robot.column("initial_position") if robot else 0.0
     poses: dict[str, FloatArray] = {}
+    seen = {"time": time - time[0]}
     for name, raw in sorted(columns.items()):
         if name not in places and name not in bodies:
             known = ", ".join((*joints, *bodies))
@@ -98,7 +103,8 @@ def _log(columns: Columns, scene: Scene, robot: Robot) -> Log:
         digest.update(name.encode() + array.tobytes())
         if name in places:
             part, k = places[name]
-            rows[part, :, k] = np.interp(grid, time - time[0], array)
+            rows[part, :, k] = np.interp(grid, seen["time"], array)
+            seen |= {} if part else {name: array}
             continue
         wrong = np.abs(np.linalg.norm(array[:, 3:], axis=1) - 1) > UNIT_TOLERANCE
         if wrong.any():
@@ -106,14 +112,20 @@ def _log(columns: Columns, scene: Scene, robot: Robot) -> Log:
             raise ValueError(f"has a quaternion of no unit length in {name!r:.80}, row {row}")
         poses[bodies[name]] = array
     named = [name for name in joints if name in columns]
-    if not named:
-        raise ValueError(f"has positions of no joint; the scene has {', '.join(joints)}")
-    ends = np.array([PreparedRobot(robot).limits[name] for name in joints])
+    if not named and not poses:
+        known = ", ".join((*joints, *bodies))
+        raise ValueError(f"has positions of no joint and no body; the scene has {known}")
+    ends = PreparedRobot(robot).limits if robot else {}
+    first = [float(np.clip(at, *ends[name])) for name, at in zip(joints, rows[0, 0], strict=True)]
+    told = [name for name in joints if f"{name}/command" in columns]
+    for k in map(joints.index, told):
+        rows[0, :, k] = rows[3, :, k]
     start, end = (tuple(Pose.from_array(array[k]) for array in poses.values()) for k in (0, -1))
     return Log(
-        Trajectory(float(grid[1]), *rows), named,
-        Start(tuple(poses), start, tuple(np.clip(rows[0, 0], *ends.T).tolist())),
-        Start(tuple(poses), end), digest.hexdigest()[:16],
+        Trajectory(float(grid[1]), *rows[:3]), named,
+        Start(tuple(poses), start, tuple(first)), Start(tuple(poses), end),
+        digest.hexdigest()[:16],
+        seen | {f"{name}/pose": array for name, array in poses.items()}, told,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.arm_following import ArmFollowing, CorrectedArmFollowing
     from pytest_simbench.tasks.arm_pushing import ArmPushing
     from pytest_simbench.tasks.base import Jitter, Moment, Outcome, Task
+    from pytest_simbench.tasks.fitting import Fitting
     from pytest_simbench.tasks.goals import GoalTask, PickAndPlace, PushingToGoal, Reaching
     from pytest_simbench.tasks.holding import Holding
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.towers import LeaningTowers
 
 __all__ = [
-    "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "GoalTask", "Holding",
-    "Jitter", "LeaningTowers", "Log", "Moment", "Outcome", "PickAndPlace", "Pushing",
+    "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Fitting", "GoalTask",
+    "Holding", "Jitter", "LeaningTowers", "Log", "Moment", "Outcome", "PickAndPlace", "Pushing",
     "PushingToGoal", "Reaching", "Replaying", "Settling", "Stacking", "Task", "Throwing", "Tossing",
     "rests_on",
 ]  # fmt: skip
@@ -31,6 +32,7 @@ _MODULES = {
     "arm_following": ("ArmFollowing", "CorrectedArmFollowing"),
     "arm_pushing": ("ArmPushing",),
     "base": ("Jitter", "Moment", "Outcome", "Task"),
+    "fitting": ("Fitting",),
     "goals": ("GoalTask", "PickAndPlace", "PushingToGoal", "Reaching"),
     "holding": ("Holding",),
     "pushing": ("CurvePushing", "Pushing"),

@@ -3,15 +3,15 @@ bodies end?"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 
 from pytest_simbench.client.world import World
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.scene import Pose, SceneError, Start, Trajectory
+from pytest_simbench.scene import FloatArray, Pose, SceneError, Start, Trajectory
 from pytest_simbench.tasks.base import Count, Outcome
 from pytest_simbench.tasks.on_scene import FARTHEST, LOG_PERIOD, OnJoints, places, started, ways
 
@@ -21,11 +21,15 @@ class Log:
     """Positions of joints along the time, and perhaps where free bodies were.
 
     Attributes:
-        trajectory: of all joints of the scene; those that are not in the log hold their start.
+        trajectory: that the drives follow, of all joints of the scene: what was told them, else
+            where they were; those that are not in the log hold their start.
         joints: names of those that are in the log.
         start: of the scene, where the log begins.
         end: poses of the free bodies that are in the log where it ends, as in a `Start`.
         digest: of what was read.
+        seen: as it was measured: `time` from 0 on [s], (n,), positions by joint, (n,), and
+            `BODY/pose`, (n, 7).
+        told: names of joints of which it holds what their drives were told.
     """
 
     trajectory: Trajectory
@@ -33,6 +37,8 @@ class Log:
     start: Start
     end: Start
     digest: str
+    seen: Mapping[str, FloatArray] = field(default_factory=dict)
+    told: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -95,7 +101,13 @@ class Replaying(OnJoints):
             motion = world.follow(told, log_period=LOG_PERIOD)
         assert motion is not None  # a log was asked for
         grid = told.tick * np.arange(len(told.position))
-        wanted = [np.interp(motion.time - began, grid, column) for column in told.position.T]
+        columns = dict(zip(self.joints, told.position.T, strict=True))
+        wanted = [
+            np.interp(motion.time - began, self.log.seen["time"], self.log.seen[name])
+            if name in self.log.seen
+            else np.interp(motion.time - began, grid, column)
+            for name, column in columns.items()
+        ]
         errors = motion.joints[:, 0] - np.transpose(wanted)
         metrics = self.by_kind("error", np.sqrt(np.mean(errors**2, axis=0)))
         metrics |= self.by_kind("worst", np.abs(errors).max(axis=0))

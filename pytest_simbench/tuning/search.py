@@ -103,7 +103,7 @@ class Search:
         study = self._study(library)
         known = {self._key({}): today}
         number = 0
-        while time.monotonic() - began + self.trials.spent < seconds and number != most:
+        while time.monotonic() - began + self.trials.runs.spent < seconds and number != most:
             if number % 2 and number == len(study.trials):
                 study.enqueue_trial(self._step(number, known))
             trial = self._trial(library, study, number)
@@ -214,6 +214,6 @@ def front(done: Sequence[Candidate], trials: Trials) -> list[Candidate]:
     return found
 
 
-def folder_name(parts: Sequence[object]) -> str:
+def folder_name(parts: Sequence[object], word: str = "tune") -> str:
     """Of the run folder of a search: the same for the same search."""
-    return file_name("tune-" + "-".join(map(str, parts[:2])), *parts[2:])
+    return file_name(f"{word}-" + "-".join(map(str, parts[:2])), *parts[2:])

@@ -6,24 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from pytest_simbench.client.errors import Unavailable, WorkerError
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import settings
-from pytest_simbench.experiment.repeater import ProgressLine, Repeater
-from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.laws import Law
-from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
-from pytest_simbench.tuning.target import (
-    CONVERGED,
-    FINER,
-    FIRST_CHOSEN,
-    Look,
-    Target,
-    TuningError,
-)
+from pytest_simbench.tuning.runs import Runs
+from pytest_simbench.tuning.target import CONVERGED, FINER, FIRST_CHOSEN, Look, Target, TuningError
 
 CHEAPER = 0.9
 """What another candidate may have cost of this one's, so that this one is hopeless: less of a
@@ -84,21 +73,15 @@ class Trials:
     Attributes:
         target: what for.
         case: how repetitions are run, with the settings that the search began with.
-        executor, progress, folder: where, what tells of it, and where records go. As many looks at
-            a task as the executor has jobs are had at once, and told one after the other: what is
+        runs: its repetitions. As many looks at a task as there are jobs are had at once, and told
+            one after the other: what is
             had beyond the one that ends a candidate does not count.
-        resumed: what an earlier search left in the folder.
-        spent: what of it was taken took [s].
     """
 
     target: Target
     case: Case
-    executor: Executor
-    progress: ProgressLine
-    folder: RunFolder
-    resumed: Resumed | None = None
+    runs: Runs
     timeout: float | None = None
-    spent: float = 0.0
     _first: dict[tuple[str, Look], Record] = field(default_factory=dict)
 
     def today(self) -> Candidate:
@@ -140,7 +123,7 @@ class Trials:
         """The candidates on the half that they were not chosen on; in turns, so that a machine that
         slows down slows all."""
         found = [Candidate(one.name, one.changes, "held_out") for one in candidates]
-        jobs = self.executor.jobs
+        jobs = self.runs.jobs
         for part in (looks[k : k + jobs] for k in range(0, len(looks), jobs)):
             for one in (*self._finer("held_out"), *found):
                 for _ in self._looks(one, part):
@@ -174,7 +157,7 @@ class Trials:
         ahead: dict[Look, Record] = {}
         for k, look in enumerate(looks):
             if look not in ahead:
-                batch = [one for one in looks[k : k + self.executor.jobs] if one.task is look.task]
+                batch = [one for one in looks[k : k + self.runs.jobs] if one.task is look.task]
                 ahead |= self._records(found, batch)
             if look not in ahead:  # another one of them ended all
                 ahead |= self._records(found, [look])
@@ -189,28 +172,10 @@ class Trials:
             yield look
 
     def _records(self, found: Candidate, looks: Sequence[Look]) -> dict[Look, Record]:
-        """Of looks at one task: what is recorded, else repetitions; without those that were ended
-        because another one ended all."""
-        task, numbers = looks[0].task, [look.number for look in looks]
-        experiment = Experiment(self._case(found), task)
-        if problem := experiment.problem():
-            raise TuningError(problem)
-        kept = self.resumed.take(experiment, None) if self.resumed else {}
-        had = [kept[number].cost("total") or 0.0 for number in numbers if number in kept]
-        self.spent += max(had, default=0.0)  # they were had at once
-        if missing := [number for number in numbers if number not in kept]:
-            self.folder.describe(experiment.task)
-            before = len(self.folder.own)
-            repeater = Repeater(experiment, self.executor, self.progress, self.folder.append)
-            try:
-                repeater.run(missing)
-            except Unavailable as error:
-                raise TuningError(error.what) from None
-            except WorkerError:  # another world than was asked for: its record tells
-                pass
-            made = [r for r in self.folder.own[before:] if r.status != "interrupted"]
-            kept |= {record.repetition: record for record in made}
-        return {look: kept[look.number] for look in looks if look.number in kept}
+        """Of looks at one task."""
+        experiment = Experiment(self._case(found), looks[0].task)
+        made = self.runs.records(experiment, [look.number for look in looks])
+        return {look: made[look.number] for look in looks if look.number in made}
 
     def _case(self, found: Candidate) -> Case:
         variant = "-".join(filter(None, [found.name, found.half]))

@@ -49,6 +49,24 @@ def test_a_joint_that_is_not_named_holds_its_start(tmp_path: Path) -> None:
     assert log.start.positions == (0.0, 0.05)
 
 
+def test_what_a_drive_was_told_is_followed_and_what_was_measured_is_kept(tmp_path: Path) -> None:
+    log = read_log(npz(tmp_path, time=TIME, hinge=HINGE, **{"hinge/command": TIME + 0.5}), SCENE)
+    assert log.trajectory.position[:, 0] == pytest.approx(TIME + 0.5)
+    assert log.seen["hinge"] == pytest.approx(HINGE)
+    assert (log.joints, log.told) == (["hinge"], ["hinge"])
+    assert log.start.positions == (0.0, 0.05)
+    assert not read_log(npz(tmp_path, time=TIME, hinge=HINGE), SCENE).told
+
+
+def test_a_log_may_be_of_bodies_alone(tmp_path: Path) -> None:
+    poses = np.tile([1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (21, 1))
+    for world in (WHOLE, replace(WHOLE, robot=None)):
+        log = read_log(npz(tmp_path, time=TIME, **{"table/pose": poses}), world)
+        assert log.joints == []
+        assert log.trajectory.duration == pytest.approx(1.0)
+        assert log.seen["table/pose"][:, 2] == pytest.approx(0.2)
+
+
 def test_npz_and_csv_of_the_same_are_the_same_log(tmp_path: Path) -> None:
     speed = {"hinge/velocity": 0.5 * np.cos(TIME), "hinge/effort": 2 * TIME}
     rows = zip(TIME, HINGE, *speed.values(), strict=True)

@@ -45,6 +45,14 @@ def test_the_error_is_held_against_the_log_at_each_sample() -> None:
     assert set(metrics) == {metric.name for metric in task.metrics}
 
 
+def test_the_error_is_held_against_what_was_measured_where_commands_are_known() -> None:
+    seen = {"time": np.array([0.0, 1.0]), "hinge": np.array([0.25, 0.25])}
+    task = Replaying(SCENE, replace(log_of(["hinge"]), told=["hinge"], seen=seen))
+    world = Scripted(SCENE, end=(0.0, 0.0))
+    metrics = task.perform(world, 1, lambda done, of: None).metrics  # type: ignore[arg-type]
+    assert metrics["error_hinges"] == pytest.approx(math.degrees(0.25))
+
+
 def test_joints_that_the_log_does_not_name_are_not_measured() -> None:
     task = Replaying(SCENE, log_of(["slider"]))
     assert [metric.name for metric in task.metrics] == ["error_sliders", "worst_sliders"]

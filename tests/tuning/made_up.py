@@ -16,6 +16,7 @@ from pytest_simbench.experiment.repetition import Ended, Hooks
 from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Failure
+from pytest_simbench.tuning.runs import Runs
 from pytest_simbench.tuning.target import Look, Target
 from pytest_simbench.tuning.trials import Trials
 from tests.tiny import Falling
@@ -81,4 +82,4 @@ def trials(
     place.lock()
     resumed = Resumed(place) if place.holds_run else None
     case = Case.of("mujoco", profile="default", test="t", mode="headless", folder=folder)
-    return Trials(of or target(), case, executor, printed(True), place, resumed), executor
+    return Trials(of or target(), case, Runs(executor, printed(True), place, resumed)), executor

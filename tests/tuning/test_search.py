@@ -54,7 +54,7 @@ def test_it_goes_on_as_if_it_had_not_been_interrupted(tmp_path: Path) -> None:
     part, first = search(tmp_path / "part", stops)
     with pytest.raises(KeyboardInterrupt):
         part.run(1e9, 12)
-    part.trials.folder.close()
+    part.trials.runs.folder.close()
     elsewhere = tmp_path / "elsewhere"  # what else the folder may hold is neither read nor written
     elsewhere.mkdir()
     for name in {path.name for path in (tmp_path / "part").iterdir()} - {RECORDS}:

@@ -20,7 +20,7 @@ def test_cost_and_error_are_those_of_the_records(tmp_path: Path) -> None:
     assert looks.error(today) == pytest.approx(0.125)
     assert today.cost() == pytest.approx(0.005)
     assert executor.asked == [("today", k) for k in (1, 2, 3, 4)]
-    seeds = [(r.seed, r.settings["timestep"]) for r in looks.folder.own]
+    seeds = [(r.seed, r.settings["timestep"]) for r in looks.runs.folder.own]
     assert seeds[0] == (300_001, 0.002)
 
 
@@ -52,7 +52,7 @@ def test_failures_that_today_has_too_end_nothing(tmp_path: Path) -> None:
 def test_what_is_recorded_is_not_repeated(tmp_path: Path) -> None:
     looks, _ = trials(tmp_path, lambda s, k: 1.0)
     looks.judge(looks.today(), looks=looks.target.judged)
-    looks.folder.close()
+    looks.runs.folder.close()
     again, executor = trials(tmp_path, lambda s, k: 0.0)
     today = again.today()
     (judged,) = again.judge(today, looks=again.target.judged)

@@ -1,0 +1,132 @@
+"""`simbench fit SCENE LOG --sim NAME --unknown KIND:NAME`: numbers of a scene that a log tells."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+
+from pytest_simbench.cli.main import INTERRUPTED
+from pytest_simbench.cli.runs import RUNS, printed
+from pytest_simbench.cli.selection import Selection, check, profiles_of
+from pytest_simbench.cli.tune import BUDGET, locked
+from pytest_simbench.cli.tune_told import aligned
+from pytest_simbench.cli.values import BadInput, refusing
+from pytest_simbench.experiment.executor import LocalExecutor
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.resumed import NotResumed, Resumed
+from pytest_simbench.experiment.scene_file import read_scene_file
+from pytest_simbench.experiment.variants import USUAL, Variant
+from pytest_simbench.ground.text import for_terminal
+from pytest_simbench.recordings.logs import read_log
+from pytest_simbench.records.metrics import significant
+from pytest_simbench.records.paths import write_whole
+from pytest_simbench.records.record import Record, RecordError
+from pytest_simbench.report.files import shown
+from pytest_simbench.tasks import Fitting
+from pytest_simbench.tuning.fitting import Fit, State
+from pytest_simbench.tuning.runs import Runs
+from pytest_simbench.tuning.search import folder_name
+from pytest_simbench.tuning.target import FIRST_CHOSEN
+from pytest_simbench.tuning.telling import Told
+from pytest_simbench.tuning.telling import told as told_of
+from pytest_simbench.tuning.unknowns import unknowns
+
+FILE = "file"
+"""The profile that loads a user's file as it is, whatever the scene says."""
+
+RESULT = "fitted.json"
+
+
+def fit(
+    scene: str,
+    log: str,
+    sim: str | None = None,
+    profile: Sequence[str] | None = None,
+    unknown: Sequence[Sequence[str]] | None = None,
+    noise: float | None = None,
+    budget: float | None = None,
+    output: str | None = None,
+) -> int:
+    """Fit, print, write the values; the exit code.
+
+    Raises:
+        BadInput, SimulatorError: what cannot be; one sentence.
+    """
+    if sim is None:
+        raise BadInput("name a simulator: --sim NAME (simbench list tells which there are)")
+    labels, files = profiles_of(profile or (USUAL,))
+    if len(labels) > 1:
+        raise BadInput("give one profile")
+    chosen = Selection((sim,), ("headless",), labels, named=(sim,), files=files)
+    check(chosen, makes=False)
+    variant = Variant(sim, "headless", labels[0])
+    world = read_scene_file(scene).scene
+    told = read_log(log, world)
+    sought = unknowns(list(chain.from_iterable(unknown or ())), world, told)
+    parts = (variant.simulator, Path(scene).stem, variant.profile, told.digest, noise, *sought)
+    path = Path(output) if output else Path(RUNS) / folder_name(parts, "fit")
+    case = chosen.case(variant, test="fit", folder=path, seed=FIRST_CHOSEN)
+    if case.base == FILE:
+        raise BadInput("the profile file loads the scene as it is written; choose another to fit")
+    with closing(locked(path)) as folder, closing(LocalExecutor(1)) as executor:
+        with refusing(RecordError):
+            resumed = Resumed(folder) if folder.holds_run else None
+        runs = Runs(executor, printed(True), folder, resumed)
+        ends = time.monotonic() + (budget or BUDGET)
+
+        def run(task: Fitting, name: str) -> Record:
+            if time.monotonic() + runs.spent > ends:
+                raise _OutOfTime
+            test = f"fit[{case.simulator}-{case.mode}-{name}]"
+            own = replace(case, test=test, function="fit", variant=name)
+            return runs.records(Experiment(own, task), [1])[1]
+
+        fitting = Fit(world, told, sought, noise, run)
+        try:
+            with refusing(NotResumed):
+                found = fitting.best()
+        except (KeyboardInterrupt, _OutOfTime) as ended:
+            why = "interrupted" if isinstance(ended, KeyboardInterrupt) else "the budget is used up"
+            print(f"{why} after {fitting.looks} repetitions; the same command goes on")
+            return INTERRUPTED
+        results = list(told_of(fitting, found))
+        print(for_terminal("\n".join(_lines(results, fitting, found))))
+        with refusing(OSError, str(path)):
+            write_whole(path, RESULT, _written(results).encode())
+        print(f"values: {shown(path / RESULT, Path.cwd())}")
+    return 0
+
+
+class _OutOfTime(Exception):
+    pass
+
+
+def _lines(results: Sequence[Told], fitting: Fit, found: State) -> Iterator[str]:
+    rows = [("", "value", "95 % interval", "scene", "")]
+    for one in results:
+        ends = f"{significant(one.low, 4)} to {significant(one.high, 4)}"
+        determined = (significant(one.value, 4), ends) if not one.why else ("not determined", "")
+        rows.append((one.unknown.name, *determined, significant(one.unknown.value, 4), one.why))
+    yield from (*aligned(rows), "")
+    assert fitting.first is not None  # it was looked at
+    for metric in Fitting(fitting.scene, fitting.log).metrics:
+        values = fitting.first.metrics.get(metric.name), found.record.metrics[metric.name]
+        before, after = ("-" if value is None else significant(value) for value in values)
+        yield f"{metric.title}: {before} {metric.unit} before, {after} {metric.unit} after"
+    for name, times in fitting.misfit(found.columns).items():
+        yield f"{name} is {significant(times)} times the noise off: the scene does not explain it"
+    yield f"{fitting.looks} repetitions"
+
+
+def _written(results: Sequence[Told]) -> str:
+    rows = {
+        one.unknown.name: {"value": one.value, "low": one.low, "high": one.high}
+        for one in results
+        if not one.why
+    }
+    return json.dumps(rows, indent=1) + "\n"

@@ -1,0 +1,119 @@
+"""`simbench fit` on MuJoCo: planted values are found, a fit goes on, bad input is one sentence."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pytest_simbench.cli.main import main
+
+DRIVE = """
+<mujoco model="drive">
+  <worldbody>
+    <body name="rod" pos="0 0 1">
+      <joint name="hinge" type="slide" axis="1 0 0" range="-2 2"/>
+      <geom type="box" size=".1 .1 .1" mass="1"/>
+    </body>
+  </worldbody>
+  <actuator><position joint="hinge" kp="{}" kv="{}" forcerange="-1000 1000"/></actuator>
+</mujoco>
+"""
+"""1 kg behind a drive: x'' = k (u - x) - d x'."""
+
+TIME = np.linspace(0, 1, 101)
+STIFFNESS, DAMPING = 100.0, 4.0
+
+
+def step() -> np.ndarray:
+    """The answer to a step of 0.2 m, in closed form."""
+    decay = DAMPING / 2
+    speed = np.sqrt(STIFFNESS - decay**2)
+    turn = speed * TIME
+    return 0.2 * (1 - np.exp(-decay * TIME) * (np.cos(turn) + decay / speed * np.sin(turn)))
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "drive.xml").write_text(DRIVE.format(25, 12))
+    noisy = step() + 1e-3 * np.random.default_rng(1).standard_normal(len(TIME))
+    told = np.full(len(TIME), 0.2)
+    np.savez(tmp_path / "log.npz", time=TIME, hinge=noisy, **{"hinge/command": told})
+    np.savez(tmp_path / "alone.npz", time=TIME, hinge=noisy)
+    np.savez(tmp_path / "other.npz", time=TIME, knee=noisy)
+    return tmp_path
+
+
+BOTH = ("fit", "drive.xml", "log.npz", "--sim", "mujoco", "--noise", "0.001", "--output", "out",
+        "--unknown", "stiffness:hinge", "--unknown", "damping:hinge")  # fmt: skip
+
+
+@pytest.mark.engine
+def test_gains_of_a_drive_from_the_closed_form(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From a quarter of the stiffness and three times the damping; called again it repeats
+    nothing, and what a killed one had not come to is run then."""
+    assert main(BOTH) == 0
+    told = capsys.readouterr().out
+    assert "places off the log" in told
+    found = json.loads((folder / "out/fitted.json").read_text())
+    assert found["stiffness:hinge"]["value"] == pytest.approx(STIFFNESS, rel=0.01)
+    assert found["damping:hinge"]["value"] == pytest.approx(DAMPING, rel=0.02)
+    whole = (folder / "out/records.jsonl").read_text().splitlines(keepends=True)
+    assert main(BOTH) == 0
+    assert (folder / "out/records.jsonl").read_text() == "".join(whole)
+    (folder / "out/records.jsonl").write_text("".join(whole[:12]))
+    assert main(BOTH) == 0
+    again = [json.loads(line) for line in (folder / "out/records.jsonl").read_text().splitlines()]
+    assert [r["details"] for r in again] == [json.loads(line)["details"] for line in whole]
+    assert capsys.readouterr().out.count(told.partition("values:")[0]) == 2
+
+
+@pytest.mark.engine
+def test_the_mass_and_both_gains_are_not_told_apart(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*BOTH, "--unknown", "mass:rod"]) == 0
+    assert "the log tells its ratio to stiffness:hinge and damping:hinge alone" in (
+        capsys.readouterr().out
+    )
+    assert json.loads((folder / "out/fitted.json").read_text()) == {}
+
+
+@pytest.mark.engine
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"stiffness:hinge": "stiffness:knee"}, "has no 'stiffness:knee'; choose from friction:gr"),
+        ({"log.npz": "other.npz"}, "holds 'knee', which scene 'drive' has not"),
+        ({"log.npz": "alone.npz"}, "lacks the column hinge/command"),
+        ({"0.001": "0"}, "give a number from 1e-09 to 1"),
+        ({"drive.xml": "none.xml"}, "none.xml"),
+        ({"mujoco": "mujoko"}, "unknown simulator 'mujoko'"),
+        ({"--noise": "--profile", "0.001": "file"}, "loads the scene as it is written"),
+    ],
+)
+def test_bad_input(
+    change: dict[str, str], message: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        status = main([change.get(word, word) for word in BOTH])
+    except SystemExit as error:
+        status = int(error.code or 0)
+    told = capsys.readouterr().err
+    assert (status, told.count("\n")) == (2, 1)
+    assert message in told
+    assert not (folder / "out").exists()
+
+
+@pytest.mark.engine
+def test_no_unknown_and_no_time(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(BOTH[:9]) == 2
+    assert "name what is unknown: --unknown NAME; choose from" in capsys.readouterr().err
+    assert main([*BOTH, "--budget", "0.5s"]) == 130
+    assert "the budget is used up after" in capsys.readouterr().out
