@@ -108,7 +108,7 @@ def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
     more = [b - a for a, b in pairs]
     bound = _difference(more, target.metric.bounded)
     margin = allowed(target, before) - before
-    verdict, reason = _of_seeds(bound, margin, more)
+    verdict, reason = _of_seeds(bound, margin, target.metric.smallest_difference, more)
     return Judgement(verdict, len(looks), before, after, bound, cheaper, reason)
 
 
@@ -174,10 +174,13 @@ def _difference(more: Sequence[float], bounded: bool) -> Interval:
     return skewed_t(more)
 
 
-def _of_seeds(bound: Interval, margin: float, more: Sequence[float]) -> tuple[str, str]:
+def _of_seeds(
+    bound: Interval, margin: float, least: float, more: Sequence[float]
+) -> tuple[str, str]:
+    """Less than `least` means nothing, however certain."""
     lost = sum(d > 0 for d in more)
     told = f"worse in {lost} of {bound.n} seeds; margin {significant(margin)}"
-    if bound.high < 0:
+    if bound.high < -least:
         return "better", told
     if bound.high <= margin:
         return "not worse", told

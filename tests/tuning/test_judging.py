@@ -10,6 +10,7 @@ import pytest
 
 from pytest_simbench.laws import LAWS
 from pytest_simbench.measure.verdicts import at_least
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.tuning.judging import SEEDS, allowed, judged, recommended
 from pytest_simbench.tuning.target import Look, Target
 from pytest_simbench.tuning.trials import Candidate
@@ -69,6 +70,15 @@ def test_verdicts_on_seeds(before: list[float], after: list[float], verdict: str
     assert found.verdict == verdict
     assert found.worse_by is not None
     assert found.worse_by.low <= found.worse_by.mean <= found.worse_by.high
+
+
+@pytest.mark.parametrize(("less", "verdict"), [(1e-6, "not worse"), (5e-3, "better")])
+def test_less_than_what_means_anything_is_no_better(less: float, verdict: str) -> None:
+    late = Metric("late", "late", unit="s", better="lower", least=0)
+    of = replace(target(1, 8), metric=late)
+    before = [1.0 + k / 100 for k in range(8)]
+    old, new = (candidate(e, 1.0, of) for e in (before, [x - less for x in before]))
+    assert judged(old, new, of).verdict == verdict
 
 
 def test_the_cost_is_told_with_its_interval() -> None:
