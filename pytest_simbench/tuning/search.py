@@ -20,7 +20,7 @@ from pytest_simbench.simulator.ranges import Linear, Log, Searched, changes, sea
 from pytest_simbench.simulator.settings import Settings
 from pytest_simbench.tuning.judging import recommended
 from pytest_simbench.tuning.steps import TRIES, acts, between, corners, near, own_values
-from pytest_simbench.tuning.target import TuningError
+from pytest_simbench.tuning.target import FAILED, TuningError
 from pytest_simbench.tuning.trials import Candidate, Trials
 
 STARTUP = 10
@@ -205,10 +205,12 @@ class Search:
 
 
 def front(done: Sequence[Candidate], trials: Trials) -> list[Candidate]:
-    """The candidates that none beats in both cost and error, the cheapest first."""
+    """The candidates that none beats in both cost and error, the cheapest first; without those that
+    lack an error on some seed, unless all do."""
     found: list[Candidate] = []
     whole = [one for one in done if not one.ended and one.costs]
-    for one in sorted(whole, key=lambda c: (c.cost(), trials.error(c))):
+    told = [one for one in whole if FAILED not in one.errors.values()]
+    for one in sorted(told or whole, key=lambda c: (c.cost(), trials.error(c))):
         if not found or trials.error(one) < trials.error(found[-1]):
             found.append(one)
     return found

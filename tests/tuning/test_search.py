@@ -12,7 +12,8 @@ import pytest
 from pytest_simbench.records.folder import RECORDS
 from pytest_simbench.simulator.registry import adapter, address
 from pytest_simbench.tuning.search import Search, front, space_of
-from pytest_simbench.tuning.target import TuningError
+from pytest_simbench.tuning.target import FAILED, TuningError
+from pytest_simbench.tuning.trials import Candidate
 
 from .made_up import MadeUp, Score, trials
 
@@ -114,3 +115,15 @@ def test_without_optuna(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setitem(sys.modules, "optuna", None)
     with pytest.raises(TuningError, match=r"pip install 'pytest-simbench\[tune\]'"):
         search(tmp_path)[0].run(1e9, 1)
+
+
+def test_what_lacks_an_error_on_a_seed_is_on_no_front(tmp_path: Path) -> None:
+    looks, _ = trials(tmp_path, score)
+
+    def one(name: str, cost: float, *errors: float) -> Candidate:
+        known = dict(zip(looks.target.chosen, errors, strict=True))
+        return Candidate(name, {}, errors=known, costs=dict.fromkeys(known, cost))
+
+    whole, lacks = one("whole", 2.0, 0.5, 0.5, 0.5, 0.5), one("lacks", 1.0, 0.0, 0.0, 0.0, FAILED)
+    assert front([lacks, whole], looks) == [whole]
+    assert front([lacks], looks) == [lacks]
