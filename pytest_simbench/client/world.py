@@ -55,6 +55,8 @@ class World:
         moments: what the task noted, and when [s].
         stopwatch: wall seconds of this repetition by kind; `plan` is the task's to measure.
         timeline: wall seconds from launch of the moments that the task marked.
+        worked: clocks of stepping where the work ended and a wait for its count began; empty where
+            there was none. Rest costs otherwise than work, and not every wait is as long.
     """
 
     def __init__(
@@ -73,6 +75,7 @@ class World:
         self.scene = scene
         self.stopwatch = stopwatch or Stopwatch()
         self.timeline: dict[str, float] = {}
+        self.worked: dict[str, float] = {}
         self.time = 0.0
         self.trace: list[Motion] = []
         self.phases: list[tuple[float, str]] = []

@@ -275,6 +275,8 @@ class Repetition:
         kinds = ("launch", "compile", "load", "plan", "policy")
         seconds = {k: self.stopwatch.seconds.get(k, 0.0) for k in kinds}
         seconds["step"] = stepping.get("wall", 0.0)
+        if self._world is not None:
+            stepping = {**stepping, **self._world.worked}
         seconds["other"] = max(0.0, total - sum(seconds.values()))
         seconds["total"] = total
         notes = Notes(

@@ -51,7 +51,8 @@ class Slack:
 def settle(
     world: World, seconds: float, slacks: Callable[[Motion], Iterable[Slack]], *, full: bool
 ) -> tuple[Motion | None, Wait]:
-    """Wait `seconds` [s] of simulated time, or shorter where nothing can change any more.
+    """Wait `seconds` [s] of simulated time, or shorter where nothing can change any more. The costs
+    of stepping are those of the work before.
 
     Args:
         slacks: of the task's counts, for what the wait was so far.
@@ -60,6 +61,7 @@ def settle(
     Returns:
         The motion, None if it was too short for a sample; and how it ended.
     """
+    world.worked = world.stats()["stepping"]
     began, parts = world.time, []
     ends = [] if full else np.arange(WINDOW, seconds - WINDOW / 2, WINDOW).tolist()
     for end in [*ends, seconds]:

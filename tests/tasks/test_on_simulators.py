@@ -68,6 +68,7 @@ def test_a_shorter_wait_changes_no_count_and_is_never_pooled_with_a_full_one(cas
     assert wait is not None
     assert (wait.seconds, wait.of, wait.reach < wait.slack) == (pytest.approx(2.0), 6.0, True)
     assert full.notes.wait == Wait(pytest.approx(6.0), 6.0)
+    assert short.stepping["simulated"] == full.stepping["simulated"]
     assert not agree(short, full)
     assert "settings.task.full_wait was false, is true" in differences({"a": ([short], [full])})[0]
 

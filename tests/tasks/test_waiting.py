@@ -33,6 +33,7 @@ class Gliding:
     ) -> None:
         self.scene, self.time, self.timestep, self.asked = SCENE, 12.8, timestep, 0
         self.began = self.time
+        self.worked: dict[str, float] = {}
         self.paths = x, turn, swing
 
     def row(self, t: float) -> tuple[FloatArray, FloatArray]:
@@ -41,6 +42,9 @@ class Gliding:
         bodies[:, 0], bodies[:, 3] = (x, 1.0), 1.0
         bodies[0, 3], bodies[0, 6] = np.cos(turn / 2), np.sin(turn / 2)
         return np.array([[swing], [0.0]]), bodies
+
+    def stats(self) -> dict[str, dict[str, float]]:
+        return {"stepping": {"simulated": self.time}}
 
     def wait(self, duration: float, *, log_period: float | None = None) -> Motion | None:
         self.asked += 1
@@ -65,6 +69,7 @@ def waited(
 
     _, wait = settle(world, seconds, slacks, full=full)  # type: ignore[arg-type]
     assert wait.seconds == pytest.approx(world.time - world.began)
+    assert world.worked == {"simulated": world.began}  # what the wait costs does not count
     return wait, world.paths[0](world.time - world.began) > at
 
 
