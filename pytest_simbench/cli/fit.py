@@ -11,25 +11,23 @@ from itertools import chain
 from pathlib import Path
 
 from pytest_simbench.cli.main import INTERRUPTED
-from pytest_simbench.cli.runs import RUNS, printed
-from pytest_simbench.cli.selection import Selection, check, profiles_of
-from pytest_simbench.cli.tune import BUDGET, locked
-from pytest_simbench.cli.tune_told import aligned
+from pytest_simbench.cli.runs import RUNS
+from pytest_simbench.cli.searching import BUDGET, begins_with, runs_in
+from pytest_simbench.cli.selection import Selection, check
+from pytest_simbench.cli.tables import aligned
 from pytest_simbench.cli.values import BadInput, refusing
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.resumed import NotResumed, Resumed
 from pytest_simbench.experiment.scene_file import read_scene_file
-from pytest_simbench.experiment.variants import USUAL, Variant
+from pytest_simbench.experiment.variants import Variant
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.recordings.logs import read_log
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.paths import write_whole
-from pytest_simbench.records.record import Record, RecordError
+from pytest_simbench.records.record import Record
 from pytest_simbench.report.files import shown
 from pytest_simbench.tasks import Fitting
 from pytest_simbench.tuning.fitting import Fit, State
-from pytest_simbench.tuning.runs import Runs
 from pytest_simbench.tuning.search import folder_name
 from pytest_simbench.tuning.target import FIRST_CHOSEN
 from pytest_simbench.tuning.telling import Told
@@ -57,11 +55,8 @@ def fit(
     Raises:
         BadInput, SimulatorError: what cannot be; one sentence.
     """
-    if sim is None:
-        raise BadInput("name a simulator: --sim NAME (simbench list tells which there are)")
-    labels, files = profiles_of(profile or (USUAL,))
-    if len(labels) > 1:
-        raise BadInput("give one profile")
+    labels, files = begins_with(sim, profile)
+    assert sim is not None  # or it was refused
     chosen = Selection((sim,), ("headless",), labels, named=(sim,), files=files)
     check(chosen, makes=False)
     variant = Variant(sim, "headless", labels[0])
@@ -73,10 +68,7 @@ def fit(
     case = chosen.case(variant, test="fit", folder=path, seed=FIRST_CHOSEN)
     if case.base == FILE:
         raise BadInput("the profile file loads the scene as it is written; choose another to fit")
-    with closing(locked(path)) as folder, closing(LocalExecutor(1)) as executor:
-        with refusing(RecordError):
-            resumed = Resumed(folder) if folder.holds_run else None
-        runs = Runs(executor, printed(True), folder, resumed)
+    with closing(LocalExecutor(1)) as executor, runs_in(path, executor) as runs:
         ends = time.monotonic() + (budget or BUDGET)
 
         def run(task: Fitting, name: str) -> Record:
@@ -88,8 +80,7 @@ def fit(
 
         fitting = Fit(world, told, sought, noise, run)
         try:
-            with refusing(NotResumed):
-                found = fitting.best()
+            found = fitting.best()
         except (KeyboardInterrupt, _OutOfTime) as ended:
             why = "interrupted" if isinstance(ended, KeyboardInterrupt) else "the budget is used up"
             print(f"{why} after {fitting.looks} repetitions; the same command goes on")

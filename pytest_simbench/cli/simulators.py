@@ -8,6 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from pytest_simbench.cli.names import read_names
+from pytest_simbench.cli.tables import aligned
 from pytest_simbench.client import environments
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.report.model.capabilities import columns
@@ -106,10 +107,7 @@ def _settings(name: str) -> Iterator[str]:
         for setting, meaning in meanings(kind).items():
             values = (in_words(getattr(one, setting)) for one in profiles.values())
             rows.append((setting, *values, ", ".join(ranges.get(setting, "-")), meaning))
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        for row in rows:
-            padded = (text.ljust(width) for text, width in zip(row, widths, strict=True))
-            yield "  ".join(padded).rstrip()
+        yield from aligned(rows)
 
 
 def _paragraphs(

@@ -12,8 +12,9 @@ from typing import Any
 from pytest_simbench.cli.asked import asked
 from pytest_simbench.cli.main import INTERRUPTED
 from pytest_simbench.cli.names import read_names
-from pytest_simbench.cli.runs import RUNS, printed
-from pytest_simbench.cli.selection import EVERY, Selection, check, profiles_of
+from pytest_simbench.cli.runs import RUNS
+from pytest_simbench.cli.searching import BUDGET, begins_with, runs_in
+from pytest_simbench.cli.selection import EVERY, Selection, check
 from pytest_simbench.cli.tune_told import (
     Result,
     front_of,
@@ -27,25 +28,18 @@ from pytest_simbench.cluster.executor import ClusterExecutor
 from pytest_simbench.cluster.offers import Node, refusal
 from pytest_simbench.cluster.pool import Pool
 from pytest_simbench.experiment.executor import Executor, LocalExecutor
-from pytest_simbench.experiment.resumed import NotResumed, Resumed
-from pytest_simbench.experiment.variants import USUAL, Variant
+from pytest_simbench.experiment.variants import Variant
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.records.paths import FolderError, write_whole
-from pytest_simbench.records.record import RecordError
+from pytest_simbench.records.paths import write_whole
 from pytest_simbench.report.figures.drawing import FiguresUnavailable, drawing, write
 from pytest_simbench.report.figures.front import draw
 from pytest_simbench.report.files import shown
 from pytest_simbench.simulator.registry import adapter, known
 from pytest_simbench.tuning.judging import SEEDS, recommended
-from pytest_simbench.tuning.runs import Runs
-from pytest_simbench.tuning.search import Search, folder_name, front, space_of
+from pytest_simbench.tuning.search import Search, finished, folder_name, front, space_of
 from pytest_simbench.tuning.target import target as target_of
 from pytest_simbench.tuning.trials import Candidate, Trials
-
-BUDGET = 1800.0
-"""[s]"""
 
 SEARCHING = 0.75
 """Of the budget; the rest is for judging."""
@@ -70,11 +64,8 @@ def tune(
     Raises:
         BadInput, SimulatorError, DataError, ExecutorError: what cannot be; one sentence.
     """
-    if sim is None:
-        raise BadInput("name a simulator: --sim NAME (simbench list tells which there are)")
-    labels, files = profiles_of(profile or (USUAL,))
-    if len(labels) > 1:
-        raise BadInput("give one profile: the search begins with it")
+    labels, files = begins_with(sim, profile)
+    assert sim is not None  # or it was refused
     names, builds = read_names(known() if EVERY in sim else dict.fromkeys(sim), Path.cwd())
     several, results, left = len(names) > 1, [], []
     with _executor(jobs, cluster) as (executor, nodes):
@@ -157,11 +148,8 @@ def _search(
     claims = [f"{metric.name} {claim}" for metric, claim in wanted.claims]
     parts = (name, target, label, wanted.cost, error, seeds, seed, *map(str, space), *claims)
     path = output or Path(RUNS) / folder_name(parts)
-    with closing(locked(path)) as folder:
-        with refusing(RecordError):
-            resumed = Resumed(folder) if folder.holds_run else None
-        case = replace(case, folder=path)
-        looks = Trials(wanted, case, Runs(executor, printed(True), folder, resumed))
+    with runs_in(path, executor) as runs:
+        looks = Trials(wanted, replace(case, folder=path), runs)
         search = Search(looks, base, space, seed, progress(looks))
         over = ", ".join(dict.fromkeys(one.setting for one in space))
         print(for_terminal(f"{target} on {name}, from its profile {label}; over {over}"))
@@ -169,31 +157,25 @@ def _search(
             print(for_terminal(f"claimed: {'; '.join(claims)}"))
         if note:
             print(for_terminal(f"what the test asks after this is not known: {note}"))
-        if resumed:
-            print(f"goes on with {len(resumed.records)} repetitions of {shown(path, Path.cwd())}")
-        with refusing(NotResumed):
-            done = search.run(SEARCHING * budget, trials)
-            best, why = recommended(done, looks)
-            halves = _judge(looks, done[0], best, (1 - SEARCHING) * budget)
+        if runs.resumed:
+            print(
+                f"goes on with {len(runs.resumed.records)} repetitions of {shown(path, Path.cwd())}"
+            )
+        done = search.run(SEARCHING * budget, trials)
+        best, why = recommended(done, looks)
+        halves = _judge(looks, done[0], best, (1 - SEARCHING) * budget)
         result = Result(looks, done, best, why, halves)
         print(for_terminal("\n".join(["", *front_of(result), "", *verdict_of(result)])))
         if best is not done[0]:
             with refusing(OSError, str(path)):
                 write_whole(path, f"{name}.tuned.toml", profile_of(result).encode())
             print(f"profile: {shown(path / f'{name}.tuned.toml', Path.cwd())}")
-        points = [(c.cost(), looks.error(c)) for c in done if not c.ended and c.costs]
+        today, *points = [(c.cost(), looks.error(c)) for c in (done[0], *finished(done))]
         line = [(c.cost(), looks.error(c)) for c in front(done, looks)]
         with suppress(FiguresUnavailable), drawing(), refusing(OSError, str(path)):
-            figure = draw(points, line, points[0], wanted.cost, wanted.unit)
+            figure = draw(points, line, today, wanted.cost, wanted.unit)
             print(f"picture: {shown(write(path, [('front', figure)])[0], Path.cwd())}")
     return result
-
-
-def locked(path: Path) -> RunFolder:
-    folder = RunFolder(path)
-    with refusing(FolderError):
-        folder.lock()
-    return folder
 
 
 def _judge(trials: Trials, today: Candidate, found: Candidate, seconds: float) -> list[Candidate]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from pytest_simbench.cli.tables import aligned
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.ground.versions import base_name
 from pytest_simbench.measure.intervals import Interval
@@ -121,13 +122,6 @@ def together(results: Iterable[Result]) -> Iterator[str]:
         factor = significant(old.cost() / new.cost())
         rows.append((of.trials.case.simulator, costs[0], before, costs[1], after, factor, verdict))
     yield from aligned(rows)
-
-
-def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """Rows of a table, its columns one below the other."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=True)).rstrip()
 
 
 def _interval(of: Interval) -> str:

@@ -204,13 +204,17 @@ class Search:
         return min(cost, 10 * today.cost()), self.trials.error(found)
 
 
-def front(done: Sequence[Candidate], trials: Trials) -> list[Candidate]:
-    """The candidates that none beats in both cost and error, the cheapest first; without those that
-    lack an error on some seed, unless all do."""
-    found: list[Candidate] = []
+def finished(done: Sequence[Candidate]) -> list[Candidate]:
+    """Those that were looked at to the end; without those that lack an error on some seed, unless
+    all do."""
     whole = [one for one in done if not one.ended and one.costs]
-    told = [one for one in whole if FAILED not in one.errors.values()]
-    for one in sorted(told or whole, key=lambda c: (c.cost(), trials.error(c))):
+    return [one for one in whole if FAILED not in one.errors.values()] or whole
+
+
+def front(done: Sequence[Candidate], trials: Trials) -> list[Candidate]:
+    """The finished candidates that none beats in both cost and error, the cheapest first."""
+    found: list[Candidate] = []
+    for one in sorted(finished(done), key=lambda c: (c.cost(), trials.error(c))):
         if not found or trials.error(one) < trials.error(found[-1]):
             found.append(one)
     return found

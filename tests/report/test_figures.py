@@ -14,7 +14,7 @@ from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.recordings.album import Album
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.figures import sweep
+from pytest_simbench.report.figures import front, sweep
 from pytest_simbench.report.figures.drawing import FiguresUnavailable, drawing, write
 from pytest_simbench.report.figures.history import FAILS, NOT_ASKED, draw_laws
 from pytest_simbench.report.figures.sheet import sheet_name, sheets
@@ -196,3 +196,21 @@ def test_hostile_names_do_no_harm_and_what_cannot_be_read_is_told(tmp_path: Path
     drawn, (problem,) = sheets(tmp_path, [made])
     assert drawn == {}
     assert "holds no arrays" in problem
+
+
+@pytest.mark.parametrize("least", [0.0, 3e-4])
+def test_the_front_of_a_search_has_plain_numbers_at_its_axes(least: float) -> None:
+    pytest.importorskip("matplotlib")
+    points = [(0.0114, 0.019), (0.0139, 4e-4), (0.0204, least), (0.03, 0.09)]
+    with drawing():
+        figure = front.draw(points, points[:3], (0.018, 0.0128), "cpu_cost", "m")
+        figure.canvas.draw()
+        (axis,) = figure.axes
+        texts = [
+            [label.get_text() for label in labels if label.get_text()]
+            for labels in (axis.get_xticklabels(), axis.get_yticklabels())
+        ]
+    assert all(float(text) >= 0 for row in texts for text in row)
+    inside = [x for x in map(float, texts[0]) if 0.0114 <= x <= 0.03]
+    assert inside
+    assert axis.get_ylim()[0] >= 0

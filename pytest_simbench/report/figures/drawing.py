@@ -98,3 +98,10 @@ def panelled(axis: Any, label: str, along: str = "x") -> None:
     """What panels have in common: a label and a grid along one of their axes."""
     getattr(axis, f"set_{along}label")(label)
     axis.grid(axis=along, alpha=0.4)
+
+
+def plain_ticks(axis: Any) -> None:
+    """Numbers beside the ticks of logarithmic scales: matplotlib's own are formulas."""
+    for side in (axis.xaxis, axis.yaxis):
+        side.set_major_formatter("{x:g}")
+        side.set_minor_formatter("")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from pytest_simbench.report.figures.drawing import plain_ticks
+
 Point = tuple[float, float]
 """Cost and error."""
 
@@ -14,6 +16,7 @@ def draw(
 ) -> Any:
     """A `matplotlib.figure.Figure`, within `figures.drawing`."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator
 
     figure: Any = Figure(figsize=(6.0, 4.0), layout="constrained")
     axis = figure.subplots()
@@ -21,7 +24,14 @@ def draw(
     axis.step(*zip(*front, strict=True), where="post", marker="o", ms=4, label="front")
     axis.plot(*today, "D", color="#d55e00", label="today's settings")
     axis.set_xscale("log")
-    axis.set_yscale("symlog", linthresh=max(0.01, min(error for _, error in points)))
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    errors = [error for _, error in (*points, today)]
+    if min(errors) > 0:
+        axis.set_yscale("log")
+    elif max(errors) > 0:
+        axis.set_yscale("symlog", linthresh=min(error for error in errors if error > 0))
+        axis.set_ylim(bottom=0)
+    plain_ticks(axis)
     axis.set_xlabel(cost)
     axis.set_ylabel(f"error [{unit}]" if unit else "error")
     axis.grid(alpha=0.4)

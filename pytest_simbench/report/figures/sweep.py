@@ -9,7 +9,7 @@ from typing import Any
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
 from pytest_simbench.measure.sweep import Point, Swept
-from pytest_simbench.report.figures.drawing import Named, line_style
+from pytest_simbench.report.figures.drawing import Named, line_style, plain_ticks
 from pytest_simbench.report.model.sweep import labels, phenomena
 
 WIDE = 4
@@ -55,9 +55,7 @@ def draw(found: Sequence[Swept], phenomenon: str, over: str) -> Any:
             axis.set_yscale("log", nonpositive="mask")
         else:  # which has no logarithm
             axis.text(0.5, 0.5, NOTHING, transform=axis.transAxes, ha="center", fontsize="small")
-        for side in (axis.xaxis, axis.yaxis):  # matplotlib's own labels are formulas
-            side.set_major_formatter("{x:g}")
-            side.set_minor_formatter("")
+        plain_ticks(axis)
         axis.set_title(for_figure(law.law), fontsize="medium")
         axis.set_xlabel(OVER[over], fontsize="small")
         axis.set_ylabel(for_figure(f"error, {law.unit}" if law.unit else "error"), fontsize="small")
