@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -87,28 +87,28 @@ class Pushing(Task):
     settle: float = 1.0
     robot: Robot | None = None
 
-    @property
+    @cached_property
     def arm(self) -> Robot:
         """The robot that pushes, its surface as slippery as the block's."""
         return replace(self.robot or panda(), friction=FRICTION)
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """All lengths and the speed over those of an arm of full reach: 0.5 for the SO-101."""
         return scale_of(self.arm)
 
-    @property
+    @cached_property
     def way(self) -> float:
         """How far the block's centre goes [m]."""
         return self.length * self.scale
 
-    @property
+    @cached_property
     def block(self) -> Vector3:
         """Edges of the block [m]."""
         x, y, z = BLOCK_SIZE
         return x * self.scale, y * self.scale, z * self.scale
 
-    @property
+    @cached_property
     def begin(self) -> Pose:
         """Of the block."""
         return Pose.at(*(self.scale * part for part in START.position))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import product
 from typing import Any, ClassVar
 
@@ -104,7 +105,7 @@ class Stacking(Task):
     full_wait: bool = False
     robot: Robot | None = None
 
-    @property
+    @cached_property
     def arm(self) -> Robot:
         """The robot that stacks, on its stand, its hand opening and closing as the task has it."""
         robot = self.robot or panda()
@@ -115,7 +116,7 @@ class Stacking(Task):
             return robot
         return replace(robot, gripper=replace(robot.gripper, closed=self.finger_closed))
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """All lengths of the scene over those of the study's: 0.4 for the SO-101."""
         return grasping_scale_of(self.robot or panda())

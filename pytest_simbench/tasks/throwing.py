@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -108,13 +108,13 @@ class Throwing(Task):
     full_wait: bool = False
     robot: Robot | None = None
 
-    @property
+    @cached_property
     def arm(self) -> Robot:
         """The robot that throws, its tool centre point in the middle of the cube."""
         robot = self.robot or panda()
         return grasping(robot, CUBE_SIZE * self.scale, self.scale, wide=True)
 
-    @property
+    @cached_property
     def scale(self) -> float:
         """All lengths of the scene over those of the study's: 0.4 for the SO-101."""
         return grasping_scale_of(self.robot or panda())
