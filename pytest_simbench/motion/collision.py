@@ -134,9 +134,19 @@ class PlanningScene:
         """
         return float(self._hand(opening, above, self.model.arm + 1)[:, 1].min(initial=np.inf))
 
-    def _hand(self, opening: float, above: float, first: int) -> FloatArray:
+    def depths(self) -> tuple[float, float]:
+        """How far above the tool centre point the palm of the open hand stands, and how far below
+        it the tips end [m]."""
+        opened, arm = self.model.robot.gripper.opened, self.model.arm
+        palm = self._hand(opened, np.inf, arm, arm)[:, 2].max(initial=-np.inf)
+        return -float(palm), float(self._hand(opened, np.inf, arm)[:, 2].max())
+
+    def _hand(
+        self, opening: float, above: float, first: int, last: int | None = None
+    ) -> FloatArray:
         """Corners of the hand's part at most so far above the tool centre point [m], in the tool
-        frame, (n, 3), from the link that joint `first` carries on; the fingers at `opening`."""
+        frame, (n, 3), of the links that joints `first` to `last` carry; the fingers at
+        `opening`."""
         model = self.model
         fingers = np.full(len(model.robot.joints) - model.arm, opening)
         q = np.concatenate([model.robot.column("initial_position")[: model.arm], fingers])
@@ -145,7 +155,8 @@ class PlanningScene:
         corners = [
             _below(tool.actInv(self._exact.oMg[link]), shape.geometry, above)
             for link in self._links
-            if (shape := self._geometry.geometryObjects[link]).parentJoint >= first
+            if first <= (shape := self._geometry.geometryObjects[link]).parentJoint
+            and (last is None or shape.parentJoint <= last)
         ]
         return np.concatenate(corners)
 

@@ -88,6 +88,13 @@ def _adapted(robot: Robot, width: float, gap: float) -> tuple[str, float | None]
     return str(path), _opening(robot, gap, width / 2)
 
 
+def width_of_jaw(robot: Robot) -> float:
+    """Of the cubes that a robot of `grasping` was made for [m]."""
+    origin = ET.fromstring(content_of(robot)["urdf"]).find(f"joint[@name='{GRASP_JOINT}']/origin")
+    assert origin is not None  # `add_tool` wrote it
+    return 2 * float(origin.get("xyz", "").split()[1])
+
+
 @cache
 def _jaw_at(robot: Robot, width: float) -> float:
     """Where the jaw of a robot of `grasping` touches a cube [rad]."""

@@ -32,14 +32,19 @@ DOWNWARD = Pose(quaternion=(0.0, 1.0, 0.0, 0.0))
 
 
 def top_down_grasps(cube: Pose) -> list[Pose]:
-    """Tool poses that grasp a cube from above, one for each of its four symmetric turns.
+    """Tool poses that grasp a cube from above, one for each of its four symmetric turns."""
+    return [tool_over(cube, yaw) for yaw in level_turns(cube)]
 
-    The cube may lie on any face; its yaw is that of the horizontal body axis nearest to x.
+
+def level_turns(body: Pose) -> list[float]:
+    """Quarters of a turn at which fingers close along the body's axes [rad].
+
+    It may lie on any side; the first yaw is that of the horizontal body axis nearest to x.
     """
-    axes = cube.rotation()
+    axes = body.rotation()
     flat = [axes[:, i] for i in range(3) if abs(axes[2, i]) < np.sqrt(0.5)]
     yaw = float(np.arctan2(flat[0][1], flat[0][0])) if flat else 0.0
-    return [tool_over(cube, yaw + quarter * np.pi / 2) for quarter in range(-2, 2)]
+    return [yaw + quarter * np.pi / 2 for quarter in range(-2, 2)]
 
 
 def tool_over(place: Pose, yaw: float) -> Pose:

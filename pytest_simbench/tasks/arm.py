@@ -20,7 +20,7 @@ from pytest_simbench.motion.kinematics import inverse_kinematics
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.planning import MotionPlanner
 from pytest_simbench.scene import FloatArray, Pose, Trajectory
-from pytest_simbench.tasks.base import CUBE_SIZE
+from pytest_simbench.tasks.base import CUBE_SIZE, distance
 
 GRASP_TIME = 0.3
 """From closing the fingers to lifting [s]."""
@@ -29,8 +29,8 @@ RELEASE_TIME = 0.2
 """From opening the fingers to retreating [s]."""
 
 IN_HAND = 0.04
-"""A cube whose centre is farther than this from the tool centre point is not held [m]. It goes
-with the scene's scale."""
+"""A body that has moved by more than this in the hand is not held any more [m]. It goes with the
+scene's scale."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Speeds:
 
     Attributes:
         free: with an empty hand.
-        carry: with a cube in the hand.
-        contact: straight down to a cube, or with one to its place.
+        carry: with something in the hand.
+        contact: straight down to a body, or with one to its place.
     """
 
     free: float = 1.0
@@ -52,8 +52,8 @@ FULL_SPEED = Speeds(1.0, 1.0, 1.0)
 """As the study moved (code: no velocity scaling)."""
 
 
-class LostCube(Exception):
-    """The cube is not in the hand where it should be; the message is the counted reason."""
+class LostBody(Exception):
+    """A body is not in the hand where it should be; the message is the counted reason."""
 
 
 class Arm:
@@ -72,8 +72,8 @@ class Arm:
         home: arm joints where it begins, (arm,) [rad].
         arm: commanded arm joints, (arm,) [rad].
         fingers: commanded finger position [m], of a jaw that turns [rad].
-        grasp: how the hand grasps a cube.
-        held: name of the cube in the hand, or None.
+        grasp: how the hand grasps: at first a cube, then what it picked last.
+        held: name of the body in the hand, or None.
     """
 
     def __init__(
@@ -219,10 +219,10 @@ class Arm:
         """See to it that the body in the hand is still there.
 
         Raises:
-            LostCube: it is not.
+            LostBody: it is not.
         """
         if not self._in_hand():
-            raise LostCube(f"{self.held} is not in the hand")
+            raise LostBody(f"{self.held} is not in the hand")
 
     def time_since_release(self) -> float:
         """Simulated seconds since the fingers were told to open."""
@@ -246,8 +246,5 @@ class Arm:
     def _in_hand(self) -> bool:
         if self.held is None:
             return False
-        joints = self.world.joints[0, : self.model.arm]
-        tool = np.array(self.model.tool_pose(joints).position)
-        return bool(
-            np.linalg.norm(tool - self.world.pose(self.held).position) < IN_HAND * self.scale
-        )
+        tool = self.model.tool_pose(self.world.joints[0, : self.model.arm])
+        return distance(tool * self._grip, self.world.pose(self.held)) < IN_HAND * self.scale

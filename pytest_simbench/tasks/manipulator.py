@@ -1,5 +1,5 @@
-"""The arm that picks, places and throws cubes. And whether a robot can grasp them where a task has
-them, which is asked before anything runs."""
+"""The arm that picks and places bodies of any shape, and throws cubes. And whether a robot can
+grasp what a task has, which is asked before anything runs."""
 
 from __future__ import annotations
 
@@ -10,12 +10,20 @@ import numpy as np
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError, Unreachable
-from pytest_simbench.motion.grasping import CLEARANCE, GRASP_LINK, Choice, choose, grasp_of
+from pytest_simbench.motion.grasping import (
+    CLEARANCE,
+    GRASP_LINK,
+    Choice,
+    Grasp,
+    choose,
+    grasp_of,
+)
+from pytest_simbench.motion.grips import grips, turns
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over, top_down_grasps
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.throw import Throw
 from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
-from pytest_simbench.tasks.arm import Arm, LostCube
+from pytest_simbench.tasks.arm import Arm, LostBody
 from pytest_simbench.tasks.base import CUBE_SIZE
 
 APPROACH = 0.10
@@ -27,7 +35,7 @@ PUT_BACK_HEIGHT = 0.005
 
 
 class Manipulator(Arm):
-    """An arm with what the tasks do to cubes."""
+    """An arm with what the tasks do to bodies."""
 
     @property
     def approach(self) -> float:
@@ -35,38 +43,44 @@ class Manipulator(Arm):
         return APPROACH * self.scale
 
     def pick(self, name: str) -> None:
-        """Grasp a cube from above and lift it by `approach`.
+        """Grasp a body from above and lift it by `approach`.
 
         Raises:
+            Ungraspable: the hand cannot hold it as it lies; nothing has moved.
             PlanningError: it cannot be reached.
-            LostCube: it is not in the hand after lifting.
+            LostBody: it is not in the hand after lifting.
         """
-        cube = self.world.pose(name)
-        tools = [tool_over(cube, pose.yaw) for pose in top_down_grasps(cube)]
-        down, above = self._plan_choice([self._aside(tool) for tool in tools], ignored=(name,))
+        seen = self.world.pose(name)
+        body = self.world.scene.body(name).moved_to(seen)
+        widths = {grip.tool: grip.width for grip in grips(self.model.robot, body, self.scale)}
+        down, above = self._plan_choice([self._aside(tool) for tool in widths], ignored=(name,))
         self.go_to(above, speed=self.speeds.free)
         self.move_straight(down, speed=self.speeds.contact, ignored=(name,))
         grasp = self._aside(down, back=True)
         if grasp != down:
             self.move_straight(grasp, speed=self.speeds.contact, ignored=(name,))
-        self.close_hand(around=name, seen=cube)
+        if self.model.has_parallel_fingers:
+            self.grasp = Grasp(widths[down] / 2)
+        self.close_hand(around=name, seen=seen)
         self.move_straight(
             grasp.translated(z=self.approach), speed=self.speeds.carry, ignored=(name,)
         )
         self.check_held()
 
     def place(self, target: Pose) -> None:
-        """Bring the held cube to `target` [pose of its centre] and let it go there.
+        """Bring the held body to `target` [pose of its centre] and let it go there.
 
-        The target's yaw may turn by quarters. Where the cube slipped in the hand it is
-        not corrected for: that error is the simulator's.
+        It may be turned about its own z axis by what leaves its shape as it is: a cube by quarters.
+        Where it slipped in the hand it is not corrected for: that error is the simulator's.
 
         Raises:
             PlanningError: the place cannot be reached.
-            LostCube: the cube fell on the way.
+            LostBody: it fell on the way.
         """
-        grips = [target * Pose.at(0, 0, 0, yaw=k * np.pi / 2) for k in range(-2, 2)]
-        tools = [grip * self._grip.inverse() for grip in grips]
+        if self.held is None:
+            raise LostBody("nothing is in the hand")
+        ways = turns(self.world.scene.body(self.held))
+        tools = [target * Pose.at(0, 0, 0, yaw=yaw) * self._grip.inverse() for yaw in ways]
         down, above = self._plan_choice(tools)
         self.go_to(above, speed=self.speeds.carry)
         self.check_held()
@@ -145,7 +159,7 @@ class Manipulator(Arm):
     def _attempt(self, what: str, motion: Callable[[], None]) -> str | None:
         try:
             motion()
-        except (PlanningError, LostCube) as error:
+        except (PlanningError, LostBody) as error:
             return f"could not {what}: {error}"
         return None
 

@@ -21,7 +21,7 @@ from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.planning import PlanningError
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Robot, Scene
-from pytest_simbench.tasks.arm import FULL_SPEED, LostCube, Speeds
+from pytest_simbench.tasks.arm import FULL_SPEED, LostBody, Speeds
 from pytest_simbench.tasks.base import (
     CUBE_SIZE,
     STUDY_TOLERANCE,
@@ -266,11 +266,11 @@ class Stacking(Task):
             picks.handled.add(name)
             with world.phase(f"place {where}"):
                 manipulator.place(place.pose.translated(z=self.release_height * self.scale))
-        except (PlanningError, LostCube) as error:
+        except (PlanningError, LostBody) as error:
             picks.fail(name, place, error)
             with world.phase(f"recover from {where}"):
                 picks.note_motion(manipulator.recover())
-            if isinstance(error, LostCube):
+            if isinstance(error, LostBody):
                 picks.handled.add(name)
             return False
         pause = self.check_delay - manipulator.time_since_release()

@@ -34,7 +34,7 @@ from pytest_simbench.motion.throw import (
 from pytest_simbench.motion.timing import synchronised_move
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import STANDARD_GRAVITY, Pose, Robot, Scene
-from pytest_simbench.tasks.arm import LostCube, Speeds
+from pytest_simbench.tasks.arm import LostBody, Speeds
 from pytest_simbench.tasks.base import (
     CUBE_SIZE,
     STUDY_TOLERANCE,
@@ -213,7 +213,7 @@ class Throwing(Task):
             metrics |= thrown.metrics()
             details |= thrown.details()
             reasons += [str(details[key]) for key in ("lost", "kept") if key in details]
-        except LostCube as error:
+        except LostBody as error:
             metrics["lost_in_transit"], details["lost"] = 1.0, str(error)
             reasons.append(str(error))
         except PlanningError as error:

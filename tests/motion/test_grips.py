@@ -1,0 +1,115 @@
+"""Where hands grasp bodies of any shape, and what they refuse."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pytest_simbench.motion.grasping import grasping
+from pytest_simbench.motion.grips import SLACK, Ungraspable, grips, hand_of, turns
+from pytest_simbench.motion.kinematics import top_down_grasps
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.motion.registry import find
+from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Pose, Sphere, principal
+from pytest_simbench.scene.bodies import ConvexMesh
+
+PANDA = panda()
+UPRIGHT = Pose.at(0.5, 0.1, 0.06, yaw=0.4)
+LYING = Pose((0.5, 0.1, 0.02), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))  # its z along minus y
+
+
+def prism(*corners: tuple[float, float], height: float = 0.04, taper: float = 1.0) -> ConvexMesh:
+    """Corners of its floor, and of its roof, which is smaller by `taper` [m]."""
+    points = [(x * s, y * s, z) for z, s in ((0.0, 1.0), (height, taper)) for x, y in corners]
+    vertices, frame = principal(points)
+    return ConvexMesh("prism", vertices, frame, mass=0.1)
+
+
+@given(yaw=st.floats(-3.0, 3.0), edge=st.floats(0.024, 0.06))
+@settings(max_examples=20)
+def test_a_cube_is_grasped_in_its_middle_at_its_four_turns(yaw: float, edge: float) -> None:
+    cube = Box("cube", (edge,) * 3, Pose.at(0.5, 0.0, edge / 2, yaw=yaw), 0.1)
+    found = grips(PANDA, cube)
+    assert [grip.tool for grip in found] == top_down_grasps(cube.pose)  # to the last bit
+    assert [grip.width for grip in found] == pytest.approx([edge] * 4)
+
+
+@pytest.mark.parametrize(
+    ("body", "width", "ways"),
+    [
+        (Box("plank", (0.2, 0.03, 0.04), Pose.at(0.5, 0.0, 0.02), 0.1), 0.03, 2),
+        (Sphere("ball", 0.03, UPRIGHT, 0.1), 0.06, 4),
+        (Cylinder("peg", 0.02, 0.12, UPRIGHT, 0.1), 0.04, 4),
+        (Cylinder("peg", 0.02, 0.12, LYING, 0.1), 0.04, 2),
+        (Capsule("pill", 0.02, 0.08, LYING, 0.1), 0.04, 2),
+    ],
+)
+def test_every_shape_is_grasped_where_it_is_narrow(body: Body, width: float, ways: int) -> None:
+    found = grips(PANDA, body)
+    assert len(found) == ways
+    for grip in found:
+        assert grip.width == pytest.approx(width, abs=1e-9)
+        assert grip.tool.position[:2] == pytest.approx(body.pose.position[:2])
+        line = grip.tool.rotation()[:, 1] @ body.pose.rotation()
+        both = body.reach(np.stack([line, -line]))
+        assert both.sum() == pytest.approx(width)  # the fingers close along that width
+
+
+def test_a_tall_peg_is_grasped_under_its_top_and_a_flat_tile_above_the_ground() -> None:
+    hand = hand_of(PANDA, 1.0)
+    peg = Cylinder("peg", 0.02, 0.12, Pose.at(0.5, 0.0, 0.06), 0.1)
+    tile = Box("tile", (0.05, 0.05, 0.012), Pose.at(0.5, 0.0, 0.006), 0.1)
+    for body, height in ((peg, 0.12 - hand.palm + SLACK), (tile, 0.012 - SLACK)):
+        assert grips(PANDA, body)[0].tool.position[2] == pytest.approx(height)
+    brick = Box("brick", (0.05, 0.05, 0.02), Pose.at(0.5, 0.0, 0.01), 0.1)
+    assert grips(PANDA, brick)[0].tool.position[2] == pytest.approx(hand.tips + SLACK)
+
+
+def test_a_prism_is_grasped_at_its_faces_where_something_stands_opposite() -> None:
+    edge, height = 0.05, 0.05 * math.sqrt(3) / 2
+    triangle = [(0.0, 0.0), (edge, 0.0), (edge / 2, height)]
+    found = grips(PANDA, prism(*triangle))
+    assert len(found) == 6  # an edge and the corner opposite, from both sides
+    assert [grip.width for grip in found] == pytest.approx([height] * 6)
+    hexagon = [(0.03 * math.cos(k), 0.03 * math.sin(k)) for k in np.arange(6) * math.pi / 3]
+    assert {round(grip.width, 9) for grip in grips(PANDA, prism(*hexagon))} == {
+        round(0.03 * math.sqrt(3), 9)
+    }
+    slanted = [(0.0, 0.0), (0.05, 0.0), (0.09, 0.03), (0.04, 0.03)]  # its short sides miss
+    assert {round(grip.width, 9) for grip in grips(PANDA, prism(*slanted))} == {0.03}
+
+
+def test_what_no_hand_holds_is_refused_in_a_sentence() -> None:
+    refused = {
+        "'ball', a sphere, of 9 cm does not fit the fingers of robot 'panda', which hold 0 to 7 cm":
+            Sphere("ball", 0.045, UPRIGHT, 0.1),
+        "'prism', a convex mesh, has no two sides opposite each other that fingers from above":
+            prism((0, 0), (0.05, 0), (0.05, 0.05), (0, 0.05), taper=0.3),
+    }  # fmt: skip
+    for sentence, body in refused.items():
+        with pytest.raises(Ungraspable, match=re.escape(sentence)):
+            grips(PANDA, body)
+
+
+def test_a_jaw_holds_what_it_was_set_for() -> None:
+    arm = find("so101")
+    ball = Sphere("ball", 0.01, Pose.at(0.2, 0.0, 0.01), 0.01)
+    with pytest.raises(Ungraspable, match="the jaw of robot 'so101' is set for nothing"):
+        grips(arm, ball, 0.4)
+    ready = grasping(arm, 0.02, 0.4)
+    assert len(grips(ready, ball, 0.4)) == 4
+    with pytest.raises(Ungraspable, match=r"of 1.4 cm does not fill the fingers"):
+        grips(ready, Sphere("ball", 0.007, Pose.at(0.2, 0.0, 0.01), 0.01), 0.4)
+
+
+def test_turns_leave_the_shape_as_it_is() -> None:
+    quarters = [-math.pi, -math.pi / 2, 0.0, math.pi / 2]
+    assert turns(Box("cube", (0.05,) * 3, UPRIGHT, 0.1)) == quarters
+    assert turns(Box("plank", (0.2, 0.03, 0.05), UPRIGHT, 0.1)) == [-math.pi, 0.0]
+    assert len(turns(Cylinder("peg", 0.02, 0.12, UPRIGHT, 0.1))) == 8
+    assert len(turns(prism((0, 0), (0.05, 0), (0.025, 0.04)))) == 1
