@@ -75,7 +75,7 @@ class MotionPlanner:
         """
         direct = straight_move(start, goal, self.limits, speed=speed)
         if self.scene.first_collision(self._thinned(direct.position)) is None:
-            return self._trajectory(direct, fingers)
+            return self.set_points(direct, fingers)
         for what, arm in (("start", start), ("goal", goal)):
             touching = self.scene.collision(arm)
             if touching is not None:
@@ -85,7 +85,7 @@ class MotionPlanner:
         path = self._shortened(path)
         parts = [straight_move(a, b, self.limits, speed=speed) for a, b in pairwise(path)]
         whole = Timed(*map(np.concatenate, zip(*parts, strict=True)))
-        return self._trajectory(whole, fingers)
+        return self.set_points(whole, fingers)
 
     def move_linear(
         self,
@@ -142,7 +142,7 @@ class MotionPlanner:
         )
         if touching is not None:
             raise InCollision(f"{what} blocked: {' and '.join(touching)}")
-        return self._trajectory(timed, fingers)
+        return self.set_points(timed, fingers)
 
     def move_fingers(
         self, arm: FloatArray, opening: float, target: float, hold: float
@@ -153,7 +153,7 @@ class MotionPlanner:
         ramp = np.interp(np.arange(rows), [0, max(1, steps)], [opening, target])
         still = np.zeros((rows, self.model.arm))
         timed = Timed(np.tile(arm[: self.model.arm], (rows, 1)), still, still)
-        return self._trajectory(timed, ramp)
+        return self.set_points(timed, ramp)
 
     def throw(
         self,
@@ -177,9 +177,9 @@ class MotionPlanner:
         )
         throw = released(self.model, timed, duration, fraction, self.scene.scale)
         fingers = np.where(np.arange(len(timed.position)) >= throw.row, opened, closed)
-        return self._trajectory(timed, fingers), throw
+        return self.set_points(timed, fingers), throw
 
-    def _trajectory(self, timed: Timed, fingers: float | FloatArray) -> Trajectory:
+    def set_points(self, timed: Timed, fingers: float | FloatArray) -> Trajectory:
         """Set points of all joints with feed-forward efforts."""
         rows = len(timed.position)
         others = len(self.model.robot.joints) - self.model.arm

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.arm_following import ArmFollowing, CorrectedArmFollowing
     from pytest_simbench.tasks.arm_pushing import ArmPushing
     from pytest_simbench.tasks.base import Jitter, Moment, Outcome, Task
+    from pytest_simbench.tasks.carrying import Carrying
     from pytest_simbench.tasks.fitting import Fitting
     from pytest_simbench.tasks.goals import GoalTask, PickAndPlace, PushingToGoal, Reaching
     from pytest_simbench.tasks.holding import Holding
@@ -22,16 +23,17 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.towers import LeaningTowers
 
 __all__ = [
-    "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Fitting", "GoalTask",
-    "Holding", "Jitter", "LeaningTowers", "Log", "Moment", "Outcome", "PickAndPlace", "Pushing",
-    "PushingToGoal", "Reaching", "Replaying", "Settling", "Stacking", "Task", "Throwing", "Tossing",
-    "rests_on",
+    "ArmFollowing", "ArmPushing", "Carrying", "CorrectedArmFollowing", "CurvePushing", "Fitting",
+    "GoalTask", "Holding", "Jitter", "LeaningTowers", "Log", "Moment", "Outcome", "PickAndPlace",
+    "Pushing", "PushingToGoal", "Reaching", "Replaying", "Settling", "Stacking", "Task",
+    "Throwing", "Tossing", "rests_on",
 ]  # fmt: skip
 
 _MODULES = {
     "arm_following": ("ArmFollowing", "CorrectedArmFollowing"),
     "arm_pushing": ("ArmPushing",),
     "base": ("Jitter", "Moment", "Outcome", "Task"),
+    "carrying": ("Carrying",),
     "fitting": ("Fitting",),
     "goals": ("GoalTask", "PickAndPlace", "PushingToGoal", "Reaching"),
     "holding": ("Holding",),

@@ -1,0 +1,236 @@
+"""A contact task: a thing of any shape is picked up, carried, shaken and held still. Does it slip?
+
+Two pads that press with N each hold up to 2 mu N along themselves (Coulomb). So what weighs less,
+the accelerations of the shaking included, stays where it was grasped; what weighs more slips out.
+The load is a share of that bound, whatever the shape.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from pytest_simbench.client.motion import Motion
+from pytest_simbench.client.world import World
+from pytest_simbench.motion.errors import PlanningError
+from pytest_simbench.motion.grips import grips
+from pytest_simbench.motion.kinematics import inverse_kinematics, tool_path
+from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.motion.timing import TICK, Timed
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.scene import (
+    STANDARD_GRAVITY,
+    Body,
+    Box,
+    Capsule,
+    ConvexMesh,
+    Cylinder,
+    FloatArray,
+    Pose,
+    Robot,
+    Scene,
+    Sphere,
+    Trajectory,
+    principal,
+)
+from pytest_simbench.tasks.arm import LostBody
+from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task, distance
+from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
+
+Shape = Literal["cube", "ball", "tube", "pill", "prism"]
+
+FRICTION = 0.5
+"""Of everything: rubber pads on wood or metal have 0.4 to 0.7."""
+
+PLACE = (0.45, -0.15)
+"""Where it stands, x and y [m]."""
+
+WAY = 0.3
+"""Sideways, and back [m]."""
+
+SHAKES, FREQUENCY, ACCELERATION = 4, 2.0, 2.5
+"""Swings up and back, how many in a second [1/s], and their largest acceleration [m/s^2]."""
+
+SAMPLING = 0.01
+"""Between samples of the motion [s]."""
+
+RESTING = 0.5
+"""The last seconds, over which it is measured how calmly it is held [s]."""
+
+PURPLE = (0.55, 0.35, 0.75, 1.0)
+
+
+@dataclass(frozen=True)
+class Carrying(Task):
+    """Carry a thing.
+
+    Attributes:
+        shape: of the thing. All are 5 cm wide between the fingers and lie or stand as they rest.
+        load: its largest weight on the way, over what two pads hold, 2 mu N.
+        still: how long it is held still at the end [s].
+        robot: that carries, with two parallel fingers; None: the Panda.
+    """
+
+    name: ClassVar[str] = "carrying"
+    study_timeout: ClassVar[float] = 600.0
+    counted: ClassVar[str] = "things held"
+    moments: ClassVar[tuple[Moment, ...]] = (Moment("before the way", "carry"),)
+
+    shape: Shape = "cube"
+    load: float = 0.8
+    still: float = 10.0
+    robot: Robot | None = None
+
+    @property
+    def arm(self) -> Robot:
+        """The robot that carries, its surface as slippery as the thing's."""
+        return replace(self.robot or panda(), friction=FRICTION)
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        held = Metric(
+            "held", "held", kind="yes_no", better="higher" if self.load < 1.0 else "lower",
+            doc="it is still in the hand at the end",
+        )  # fmt: skip
+        if self.load >= 1.0:
+            return (held,)
+        turn = Metric(
+            "turn", "turn", unit="deg", better="lower", least=0,
+            doc="by which it turned in the hand from the grasp to the end of the shaking",
+        )  # fmt: skip
+        return (
+            held,
+            Metric("slip", "slip", unit="mm", better="lower", least=0,
+                   doc="how far it moved in the hand from the grasp to the end of the shaking"),
+            *((turn,) if self.shape != "ball" else ()),
+            Metric("creep", "creep", unit="mm/min", better="lower", least=0, resolution=0.1,
+                   doc=f"how fast it moves in the hand while that is still, over {self.still:g} s"),
+            Metric("restless", "restless", unit="mm/s", better="lower", least=0, resolution=0.1,
+                   doc=f"root mean square speed in the hand in the last {RESTING:g} s"),
+        )  # fmt: skip
+
+    @property
+    def references(self) -> Mapping[str, float]:  # type: ignore[override]
+        """Of Coulomb friction."""
+        if self.load >= 1.0:
+            return {"held": 0.0}
+        still = dict.fromkeys([metric.name for metric in self.metrics], 0.0)
+        return {**still, "held": 1.0}
+
+    @property
+    def mass(self) -> float:
+        """[kg]"""
+        most = 2 * FRICTION * self.arm.gripper.squeeze
+        return self.load * most / (-STANDARD_GRAVITY[2] + ACCELERATION)
+
+    def smoke(self) -> Carrying:
+        return replace(self, still=1.0)
+
+    def problem(self) -> str | None:
+        """The hand cannot hold the thing, or cannot reach it."""
+        model = RobotModel(self.arm)
+        robot, rng = model.robot, np.random.default_rng(0)
+        if not model.has_parallel_fingers:
+            return f"robot {robot.name!r} has no two parallel fingers, so no squeeze [N] is known"
+        home = robot.column("initial_position")[: model.arm]
+        try:
+            tool = grips(robot, self.thing(Pose()))[0].tool.translated(z=APPROACH)
+            for way in (0.0, WAY):
+                inverse_kinematics(model, tool.translated(y=way), home, rng)
+        except PlanningError as error:
+            return f"robot {robot.name!r} cannot carry the {self.shape}: {error}"
+        return None
+
+    def thing(self, disturbed: Pose) -> Body:
+        """As it lies at its place, moved by a disturbance."""
+        lying, half = Pose(quaternion=(math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)), 0.025
+        at = Pose.at(*PLACE, half) * disturbed
+        more = {"mass": self.mass, "friction": FRICTION, "colour": PURPLE}
+        if self.shape == "cube":
+            return Box("thing", (2 * half,) * 3, at, **more)  # type: ignore[arg-type]
+        if self.shape == "ball":
+            return Sphere("thing", half, at, **more)  # type: ignore[arg-type]
+        if self.shape == "tube":
+            return Cylinder("thing", half, 0.08, at * lying, **more)  # type: ignore[arg-type]
+        if self.shape == "pill":
+            return Capsule("thing", half, 0.05, at * lying, **more)  # type: ignore[arg-type]
+        corner = half / math.cos(math.pi / 6)
+        ring = [(corner * math.cos(k), corner * math.sin(k)) for k in np.arange(6) * math.pi / 3]
+        corners, frame = principal([(x, y, z) for z in (-half, half) for x, y in ring])
+        return ConvexMesh("thing", corners, at * frame, **more)  # type: ignore[arg-type]
+
+    def scene(self, seed: int, jitter: Jitter) -> Scene:
+        disturbed = jitter.disturbed(Pose(), Randomness.of(seed).start)
+        return Scene("carrying", (self.thing(disturbed),), self.arm, ground_friction=FRICTION)
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        hand = Manipulator(world, Randomness.of(seed).planner)
+        looks: list[Pose] = []
+        reasons: list[str] = []
+        calm = 0.0
+        world.mark("start")
+        try:
+            with world.phase("pick"):
+                hand.pick("thing")
+            looks.append(_in_hand(world, hand.model))
+            with world.phase("carry"):
+                for way in (WAY, -WAY):
+                    hand.move_straight(hand.tool.translated(y=way), speed=hand.speeds.carry)
+            with world.phase("shake"):
+                hand.follow(self.shaking(hand))
+            looks.append(_in_hand(world, hand.model))
+            with world.phase("hold"):
+                world.wait(max(self.still - RESTING, RESTING))
+                rest = world.wait(RESTING, log_period=SAMPLING)
+            looks.append(_in_hand(world, hand.model))
+            hand.check_held()
+            assert rest is not None  # a log was asked for
+            calm = _speed(rest, hand.model)
+        except (PlanningError, LostBody) as error:
+            reasons.append(str(error))
+        world.mark("end")
+        count(int(not reasons), 1)
+        if reasons or self.load >= 1.0:
+            return Outcome({"held": float(not reasons)}, reasons=tuple(reasons))
+        grasped, shaken, end = looks
+        metrics: dict[str, float | None] = {
+            "held": 1.0,
+            "slip": 1000 * distance(grasped, shaken),
+            "creep": 1000 * distance(shaken, end) * 60.0 / self.still,
+            "restless": calm,
+        }
+        if self.shape != "ball":  # it turns freely about the line between its points of contact
+            turned = (grasped.inverse() * shaken).quaternion[0]
+            metrics["turn"] = math.degrees(2 * math.acos(min(1.0, abs(turned))))
+        return Outcome(metrics, {"in_hand": [look.as_array().tolist() for look in looks]})
+
+    def shaking(self, hand: Manipulator) -> Trajectory:
+        """Up and back with h (1 - cos) / 2, whose largest acceleration is `ACCELERATION`."""
+        pulse = 2 * math.pi * FREQUENCY
+        time = np.arange(0.0, SHAKES / FREQUENCY + TICK / 2, TICK)
+        heights = ACCELERATION / pulse**2 * (1 - np.cos(pulse * time))
+        rises = [hand.tool.translated(z=float(height)) for height in heights[1:]]
+        with hand.world.stopwatch.measuring("plan"):
+            path = tool_path(hand.model, hand.arm, rises)
+            velocity = np.gradient(path, TICK, axis=0)
+            timed = Timed(path, velocity, np.gradient(velocity, TICK, axis=0))
+            return hand.planner.set_points(timed, np.full(len(path), hand.fingers))
+
+
+def _in_hand(world: World, model: RobotModel) -> Pose:
+    """The thing's pose at the tool centre point, as the joints are."""
+    return model.tool_pose(world.joints[0, : model.arm]).inverse() * world.pose("thing")
+
+
+def _speed(rest: Motion, model: RobotModel) -> float:
+    """Root mean square speed of the thing in the hand [mm/s]."""
+    tools = [model.tool_pose(joints[0, : model.arm]) for joints in rest.joints]
+    things = [Pose.from_array(bodies[0, :7]) for bodies in rest.bodies]
+    at = np.array([(a.inverse() * b).position for a, b in zip(tools, things, strict=True)])
+    speeds: FloatArray = np.diff(at, axis=0) / np.diff(rest.time)[:, None]
+    return 1000 * float(np.sqrt(np.mean(np.sum(speeds**2, axis=1))))

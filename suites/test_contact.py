@@ -1,0 +1,38 @@
+"""Hold and carry: does what the fingers hold stay where they grasped it?
+
+    pytest suites/test_contact.py --sim=all --reps=20
+
+What weighs 0.8 of what two pads hold by friction is carried, shaken and held still; what weighs
+1.25 of it slips out (docs/contact.md). A pad that lets go, and one that glues, both fail.
+"""
+
+from typing import get_args
+
+import pytest
+from pytest_simbench.suites.named import skip_where_not_named
+
+from pytest_simbench.tasks import Carrying
+from pytest_simbench.tasks.carrying import Shape
+
+SHAPES = get_args(Shape)
+
+
+@pytest.fixture(autouse=True)
+def where_named(request):
+    skip_where_not_named(request)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_holds(repeat, threshold, shape):
+    result = repeat(Carrying(shape))
+    result.assert_crashed_at_most(threshold("crashed", 0.15))
+    result.assert_at_least("held", threshold("held", 0.8))
+    result.assert_at_most("slip", threshold("slip", 1.0))
+    if shape != "ball":  # it may turn about the line between its two points of contact
+        result.assert_at_most("turn", threshold("turn", 2.0))
+
+
+def test_slips(repeat, threshold):
+    result = repeat(Carrying("cube", load=1.25))
+    result.assert_crashed_at_most(threshold("crashed", 0.15))
+    result.assert_at_most("held", threshold("held", 0.2))

@@ -1,0 +1,86 @@
+"""Carrying: the load is the share of the bound that it says, and a perfect hand has no error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.motion.registry import find
+from pytest_simbench.scene import STANDARD_GRAVITY
+from pytest_simbench.tasks import Carrying, Jitter
+from pytest_simbench.tasks.base import Outcome
+from pytest_simbench.tasks.carrying import ACCELERATION, FRICTION, Shape
+from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, slip
+
+TASK = Carrying(still=1.0)
+
+
+def carried(*script: Mishap, task: Carrying = TASK) -> tuple[Outcome, ScriptedProcess]:
+    process = ScriptedProcess(script)
+    world = ScriptedWorld(process, task.scene(1, Jitter(0.0, 0.0)))
+    return task.perform(world, 1, lambda done, of: None), process
+
+
+def test_a_perfect_hand_has_no_error() -> None:
+    outcome, _ = carried()
+    assert outcome.metrics.pop("held") == 1.0
+    assert outcome.metrics == pytest.approx(dict.fromkeys(outcome.metrics, 0.0), abs=1e-4)
+    assert set(outcome.metrics) == set(TASK.references) - {"held"}
+
+
+def test_what_slips_and_what_creeps_are_told_apart() -> None:
+    outcome, _ = carried(Mishap("shake", 0.5, slip(z=-0.003)), Mishap("hold", 0.2, slip(z=-0.002)))
+    assert outcome.metrics["slip"] == pytest.approx(3.0, abs=1e-3)
+    assert outcome.metrics["creep"] == pytest.approx(2.0 * 60, abs=0.1)
+    fallen, _ = carried(Mishap("carry", 0.5, slip(z=-0.05)))
+    assert fallen.metrics == {"held": 0.0}
+    assert fallen.reasons == ("thing is not in the hand",)
+
+
+def test_nothing_on_the_way_pulls_harder_than_the_shaking() -> None:
+    """So the load is the share of 2 mu N that it says: from lifting on, what the tool is told to do
+    takes at most g + a of it."""
+    _, process = carried()
+    most = ACCELERATION - STANDARD_GRAVITY[2]
+    assert TASK.mass * most == pytest.approx(TASK.load * 2 * FRICTION * TASK.arm.gripper.squeeze)
+    model, after = process.model, False
+    assert model is not None
+    pulls = []
+    for asked in process.asked:
+        if asked.kind == "follow" and after:
+            rows, tick = asked.arguments["position"], asked.arguments["tick"]
+            way = np.array([model.tool_pose(row[: model.arm]).position for row in rows])
+            twice = np.diff(way, 2, axis=0) / tick**2
+            pulls.append(float(np.linalg.norm(twice - STANDARD_GRAVITY, axis=1).max()))
+        after = after or (asked.kind == "follow" and asked.arguments["position"][-1, -1] == 0.0)
+    assert len(pulls) == 4  # lifted, there, back, shaken
+    assert max(pulls) == pulls[-1] == pytest.approx(most, rel=0.01)
+
+
+@pytest.mark.parametrize("shape", get_args(Shape))
+def test_all_shapes_are_as_wide_and_reach_the_ground(shape: Shape) -> None:
+    (body,) = Carrying(shape).scene(1, Jitter(0.0, 0.0)).free_bodies
+    up = (0.0, 0.0, 1.0)
+    reach = body.reach_placed(np.array([up, tuple(-np.array(up))]))
+    assert reach[1] == pytest.approx(0.0, abs=1e-9)
+    assert Carrying(shape).problem() is None
+
+
+def test_who_cannot_carry_it_is_told_beforehand() -> None:
+    problem = TASK.on(find("so101")).problem()
+    assert problem is not None
+    assert problem.startswith("robot 'so101' has no two parallel fingers")
+    assert TASK.on(find("xarm7")).problem() is None
+
+
+@pytest.mark.parametrize(("load", "held"), [(0.8, 1.0), (1.25, 0.0)])
+def test_on_an_engine(case: Case, load: float, held: float) -> None:
+    record, error = Repetition(Experiment(case, replace(TASK, load=load)), 1).run()
+    assert error is None
+    assert record.metrics["held"] == held
