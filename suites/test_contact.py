@@ -1,9 +1,10 @@
-"""Hold and carry: does what the fingers hold stay where they grasped it?
+"""Hold, carry and pour: does what the fingers hold stay there, and are poured balls conserved?
 
     pytest suites/test_contact.py --sim=all --reps=20
 
 What weighs 0.8 of what two pads hold by friction is carried, shaken and held still; what weighs
 1.25 of it slips out (docs/contact.md). A pad that lets go, and one that glues, both fail.
+Balls that are poured into a tray are all in it at the end.
 """
 
 from typing import get_args
@@ -11,7 +12,7 @@ from typing import get_args
 import pytest
 from pytest_simbench.suites.named import skip_where_not_named
 
-from pytest_simbench.tasks import Carrying
+from pytest_simbench.tasks import Carrying, Pouring
 from pytest_simbench.tasks.carrying import Shape
 
 SHAPES = get_args(Shape)
@@ -36,3 +37,11 @@ def test_slips(repeat, threshold):
     result = repeat(Carrying("cube", load=1.25))
     result.assert_crashed_at_most(threshold("crashed", 0.15))
     result.assert_at_most("held", threshold("held", 0.2))
+
+
+@pytest.mark.parametrize("balls", [10, 30, 100])
+def test_pours(repeat, threshold, balls):
+    result = repeat(Pouring(balls))
+    result.assert_crashed_at_most(threshold("crashed", 0.15))
+    result.assert_at_least("in_tray", threshold("in_tray", 0.99))
+    result.assert_at_most("leaked", threshold("leaked", 0.01))

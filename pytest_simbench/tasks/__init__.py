@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.fitting import Fitting
     from pytest_simbench.tasks.goals import GoalTask, PickAndPlace, PushingToGoal, Reaching
     from pytest_simbench.tasks.holding import Holding
+    from pytest_simbench.tasks.pouring import Pouring
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
     from pytest_simbench.tasks.replaying import Log, Replaying
     from pytest_simbench.tasks.settling import Settling, rests_on
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ArmFollowing", "ArmPushing", "Carrying", "CorrectedArmFollowing", "CurvePushing", "Fitting",
     "GoalTask", "Holding", "Jitter", "LeaningTowers", "Log", "Moment", "Outcome", "PickAndPlace",
-    "Pushing", "PushingToGoal", "Reaching", "Replaying", "Settling", "Stacking", "Task",
+    "Pouring", "Pushing", "PushingToGoal", "Reaching", "Replaying", "Settling", "Stacking", "Task",
     "Throwing", "Tossing", "rests_on",
 ]  # fmt: skip
 
@@ -37,6 +38,7 @@ _MODULES = {
     "fitting": ("Fitting",),
     "goals": ("GoalTask", "PickAndPlace", "PushingToGoal", "Reaching"),
     "holding": ("Holding",),
+    "pouring": ("Pouring",),
     "pushing": ("CurvePushing", "Pushing"),
     "replaying": ("Log", "Replaying"),
     "settling": ("Settling", "rests_on"),

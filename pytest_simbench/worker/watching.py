@@ -141,13 +141,16 @@ class Watch:
             np.abs(bodies[:, :3] - before.bodies[:, :3]).max(initial=0.0) <= SURGE * span / 2
             and np.abs(joints[0] - before.joints[0]).max(initial=0.0) <= JOINT_SURGE * span
         ):  # else no speed need be looked at
-            wrong = implausible(self._scene, bodies)
-            if wrong is not None:  # who explodes does not cheat
-                raise DivergedError(
-                    f"{wrong}, at t = {now.time:.3f} s; a smaller timestep may help"
-                )
             pair = np.stack([before.joints, joints]), np.stack([before.bodies, bodies])
-            self._continuous(np.array([span]), *pair, np.array([now.time]))
+            try:
+                self._continuous(np.array([span]), *pair, np.array([now.time]))
+            except ParityError:
+                wrong = implausible(self._scene, bodies)
+                if wrong is None:
+                    raise
+                raise DivergedError(  # who explodes does not cheat
+                    f"{wrong}, at t = {now.time:.3f} s; a smaller timestep may help"
+                ) from None
         if step >= self._drawn:
             while self._drawn <= step:
                 self._begin, self._end = self._end, self._end * GROWTH

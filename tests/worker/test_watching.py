@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +12,9 @@ import pytest
 
 from pytest_simbench.laws.mechanisms import Part, mechanism
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.scene import Scene, Wrench
+from pytest_simbench.parity.quantities import expected_quantities
+from pytest_simbench.scene import Pose, Scene, Sphere, Wrench
+from pytest_simbench.simulator import DivergedError
 from pytest_simbench.worker.server import Server
 from pytest_simbench.worker.watching import Watch
 from pytest_simbench.worker.wire import pack
@@ -155,3 +158,16 @@ def test_steps_are_drawn_in_spans_that_grow() -> None:
         assert all(a < step <= b for step, (a, b) in zip(steps, spans, strict=False))
         assert len(steps) >= 4
     assert len({steps[0] for steps in drawn}) > 10
+
+
+@pytest.mark.parametrize(("speed", "told"), [(-3.0, ""), (0.0, "deep in the ground")])
+def test_an_impact_is_deep_for_a_moment_and_no_divergence(speed: float, told: str) -> None:
+    """A small ball falls 0.3 m in 0.1 s, into the ground. What its speed explains is none."""
+    ball = Sphere("ball", 0.008, Pose.at(0.0, 0.0, 0.3), 0.005)
+    toy, scene = Toy(), Scene("fall", (ball,))
+    toy.bodies = np.array([[0.0, 0.0, 0.3, 1.0, 0.0, 0.0, 0.0, *[0.0] * 6]])
+    watch = Watch(toy, scene, expected_quantities(scene, toy.settings), {}, 1)
+    toy.steps, fallen = 50, toy.bodies.copy()
+    fallen[0, [2, 9]] = 0.001, speed
+    with pytest.raises(DivergedError, match=told) if told else nullcontext():
+        watch.look(50, toy.joint_state(), fallen)
