@@ -1,10 +1,12 @@
-"""Hold, carry and pour: does what the fingers hold stay there, and are poured balls conserved?
+"""Hold and carry, pour, nest: does what the fingers hold stay there, are balls conserved, do bowls
+rest in each other?
 
     pytest suites/test_contact.py --sim=all --reps=20
 
 What weighs 0.8 of what two pads hold by friction is carried, shaken and held still; what weighs
 1.25 of it slips out (docs/contact.md). A pad that lets go, and one that glues, both fail.
-Balls that are poured into a tray are all in it at the end.
+Balls that are poured into a tray are all in it at the end. Nested bowls stand as high as their
+walls say.
 """
 
 from typing import get_args
@@ -12,7 +14,7 @@ from typing import get_args
 import pytest
 from pytest_simbench.suites.named import skip_where_not_named
 
-from pytest_simbench.tasks import Carrying, Pouring
+from pytest_simbench.tasks import Carrying, Nesting, Pouring
 from pytest_simbench.tasks.carrying import Shape
 
 SHAPES = get_args(Shape)
@@ -45,3 +47,11 @@ def test_pours(repeat, threshold, balls):
     result.assert_crashed_at_most(threshold("crashed", 0.15))
     result.assert_at_least("in_tray", threshold("in_tray", 0.99))
     result.assert_at_most("leaked", threshold("leaked", 0.01))
+
+
+@pytest.mark.parametrize("bowls", [2, 4, 8])
+def test_nests(repeat, threshold, bowls):
+    result = repeat(Nesting(bowls))
+    result.assert_crashed_at_most(threshold("crashed", 0.15))
+    result.assert_at_most("height_error", threshold("height_error", 0.5))
+    result.assert_at_most("tilt", threshold("tilt", 1.0))

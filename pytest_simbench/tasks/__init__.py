@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.fitting import Fitting
     from pytest_simbench.tasks.goals import GoalTask, PickAndPlace, PushingToGoal, Reaching
     from pytest_simbench.tasks.holding import Holding
+    from pytest_simbench.tasks.nesting import Nesting
     from pytest_simbench.tasks.pouring import Pouring
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
     from pytest_simbench.tasks.replaying import Log, Replaying
@@ -25,9 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArmFollowing", "ArmPushing", "Carrying", "CorrectedArmFollowing", "CurvePushing", "Fitting",
-    "GoalTask", "Holding", "Jitter", "LeaningTowers", "Log", "Moment", "Outcome", "PickAndPlace",
-    "Pouring", "Pushing", "PushingToGoal", "Reaching", "Replaying", "Settling", "Stacking", "Task",
-    "Throwing", "Tossing", "rests_on",
+    "GoalTask", "Holding", "Jitter", "LeaningTowers", "Log", "Moment", "Nesting", "Outcome",
+    "PickAndPlace", "Pouring", "Pushing", "PushingToGoal", "Reaching", "Replaying", "Settling",
+    "Stacking", "Task", "Throwing", "Tossing", "rests_on",
 ]  # fmt: skip
 
 _MODULES = {
@@ -38,6 +39,7 @@ _MODULES = {
     "fitting": ("Fitting",),
     "goals": ("GoalTask", "PickAndPlace", "PushingToGoal", "Reaching"),
     "holding": ("Holding",),
+    "nesting": ("Nesting",),
     "pouring": ("Pouring",),
     "pushing": ("CurvePushing", "Pushing"),
     "replaying": ("Log", "Replaying"),
