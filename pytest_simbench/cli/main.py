@@ -104,7 +104,7 @@ COMMANDS = (
             "judged. The first run notes the newest releases.", (
                 Argument("engines", read.word, "NAME", "simulators (default: each that a package "
                          "index has)", "*"),
-                Argument("--since", read.since, "NAME==RELEASE[:minor]", "all releases after this "
+                Argument("--since", read.word, "NAME==RELEASE[:minor]", "all releases after this "
                          "one, of each minor version the last; may come several times",
                          action="append"),
                 Argument("--scene", read.file, "FILE", "a scene (MJCF, URDF) to run, too; may come "

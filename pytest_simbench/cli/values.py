@@ -305,22 +305,6 @@ def span(text: str) -> Span:
     return Span(found[1], found[2], found[3])
 
 
-@dataclass(frozen=True)
-class Since:
-    """The releases of a simulator after one; of each minor version the last, if `minor`."""
-
-    name: str
-    release: str
-    minor: bool
-
-
-def since(text: str) -> Since:
-    """`NAME==RELEASE` or `NAME==RELEASE:minor`."""
-    form = r"([\w-]{1,100})==(\d[\w.+!-]{0,60}?)(:minor)?"
-    found = _matched(text, form, "write it as NAME==RELEASE or NAME==RELEASE:minor")
-    return Since(found[1], found[2], bool(found[3]))
-
-
 def duration(text: str) -> float:
     """A time in seconds, minutes or hours [s]."""
     form = r"(\d+\.?\d*|\.\d+)\s*(s|min|h)"

@@ -14,11 +14,10 @@ from itertools import pairwise
 from pathlib import Path
 
 from pytest_simbench import __version__
-from pytest_simbench.cli.main import BAD_INPUT, INTERRUPTED
-from pytest_simbench.cli.names import install_missing, progress
+from pytest_simbench.cli.main import BAD_INPUT
 from pytest_simbench.cli.runs import RUNS
 from pytest_simbench.cli.search import Search
-from pytest_simbench.cli.values import BadInput, Since, refusing
+from pytest_simbench.cli.values import BadInput, refusing
 from pytest_simbench.client.package_index import newest_of_minors, releases, unreleased
 from pytest_simbench.experiment.scene_file import URDF
 from pytest_simbench.experiment.variants import USUAL
@@ -27,7 +26,7 @@ from pytest_simbench.ground.files import FileError, read_file, read_json
 from pytest_simbench.ground.host import host
 from pytest_simbench.ground.names import digest, file_name
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.ground.versions import RELEASE, base_name, release_numbers
+from pytest_simbench.ground.versions import RELEASE, VersionedName, base_name, release_numbers
 from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
 from pytest_simbench.measure.watching import Step, of_laws, of_scene, of_tasks
 from pytest_simbench.records import checked
@@ -46,6 +45,9 @@ from pytest_simbench.tasks import Stacking, Throwing
 
 STATE, SCHEMA, LARGEST = "watch.json", 1, 64 * 2**20
 """The file of what was seen, its form, and how large it may be [bytes]."""
+
+MINOR = ":minor"
+"""Behind a release to begin with: of each minor version after it the last release alone."""
 
 PAGES = ("index.html", "index.md")
 
@@ -93,7 +95,7 @@ class State:
         """Add the steps of one simulator, in place of earlier ones of the same releases."""
         again = {step.names for step in steps}
         self.steps[:] = [*(step for step in self.steps if step.names not in again), *steps]
-        self.seen[steps[-1].engine] = steps[-1].new
+        self.seen.update({step.engine: step.new for step in steps})
 
     def write(self, folder: Path, sentences: Sequence[str]) -> str:
         """Write it and its page; the same as Markdown.
@@ -111,7 +113,7 @@ class State:
 
 def watch(
     engines: Sequence[str],
-    since: Sequence[Since] | None = None,
+    since: Sequence[str] | None = None,
     scene: Sequence[str] | None = None,
     reps: int | None = None,
     limit: str | None = None,
@@ -123,7 +125,10 @@ def watch(
     Raises:
         BadInput, SimulatorError: what cannot be; one sentence.
     """
-    begins = {one.name: one for one in since or ()}
+    begins = {VersionedName.of(text.removesuffix(MINOR)).base: text for text in since or ()}
+    for text in begins.values():
+        if RELEASE not in text:
+            raise BadInput(f"--since {text}: write it as NAME==RELEASE or NAME==RELEASE{MINOR}")
     names = _names([*dict.fromkeys([*engines, *begins])])
     with refusing((LimitError, UnknownMetric), "--limit"):
         limits = parse_limits(limit or LIMITS, [m for task in TASKS for m in task.metrics])
@@ -131,46 +136,34 @@ def watch(
         if not Path(path).is_file():
             raise BadInput(f"--scene {path}: there is no such file; give an MJCF or a URDF file")
     folder = Path(output) if output else Path(RUNS, "watch")
-    state, failed = State.read(folder / STATE), list[str]()
-    sentences, plans, steps = list[str](), dict[str, list[str]](), list[Step]()
-
-    def tell(text: str, into: list[str] = sentences) -> None:
-        into.append(text)
-        print(for_terminal(text), flush=True)
-
+    state, plans = State.read(folder / STATE), dict[str, list[str]]()
+    told, failed, steps = list[str](), list[str](), list[Step]()
     for name in names:
         try:
-            plan = _plan(name, begins.get(name), state.seen.get(name, ""))
-            for release, why in _missing(name, plan).items():
-                tell(f"{name} {release} is left out: {why}", failed)
-                plan.remove(release)
+            first, *new = plans[name] = _plan(name, begins.get(name, ""), state.seen.get(name, ""))
         except SimulatorError as error:
-            tell(f"{name} could not be judged: {error}", failed)
+            failed.append(f"{name} could not be judged: {error}")
             continue
-        if len(plan) > 1:
-            plans[name] = plan
-            tell(f"{name}: after {plan[0]} came {', '.join(plan[1:])}")
-        else:
-            first = "" if name in state.seen else f"; --since {name}==RELEASE begins earlier"
-            tell(f"{name}: nothing to compare after {state.seen.setdefault(name, plan[0])}{first}")
-    try:
-        for name, plan in plans.items():
-            try:
-                run = Runs(name, plan, folder, reps or REPETITIONS, [*map(Path, scene or ())])
-                judged = run.judged(limits, sum(map(len, plans.values())) - len(plans))
-            except (BadInput, RecordError) as error:
-                tell(f"{name} could not be judged: {error}", failed)
-                continue
-            steps += judged
-            state.take(judged)
-            state.write(folder, [*sentences, *failed])
-    except KeyboardInterrupt:
-        print("interrupted; the same command goes on")
-        return INTERRUPTED
+        what = f"after {first} came {', '.join(new)}" if new else f"nothing came after {first}"
+        earlier = "" if name in state.seen or new else f"; --since {name}==RELEASE begins earlier"
+        told.append(f"{name}: {what}{earlier}")
+        state.seen.setdefault(name, first)
+    print(for_terminal("\n".join([*told, *failed])), flush=True)
+    for name, plan in plans.items():
+        try:
+            run = Runs(name, plan, folder, reps or REPETITIONS, [*map(Path, scene or ())])
+            judged = run.judged(limits, sum(map(len, plans.values())) - len(plans))
+        except (BadInput, RecordError) as error:
+            failed.append(f"{name} could not be judged: {error}")
+            print(for_terminal(failed[-1]), flush=True)
+            continue
+        steps += judged
+        state.take(judged)
+        state.write(folder, [*told, *failed])
     for step in steps:
-        told = [*step.changed, *(f"({text})" for text in step.told)] or ["no change"]
-        print(for_terminal("\n  ".join([f"{step.engine} {step.new}, after {step.old}", *told])))
-    unsaid = append_summary(state.write(folder, [*sentences, *failed]))
+        lines = [*step.changed, *(f"({text})" for text in step.told)] or ["no change"]
+        print(for_terminal("\n  ".join([f"{step.engine} {step.new}, after {step.old}", *lines])))
+    unsaid = append_summary(state.write(folder, [*told, *failed]))
     print(for_terminal(unsaid or f"page: {shown(folder / PAGES[0], Path.cwd())}"))
     return 1 if any(step.changed for step in steps) else BAD_INPUT if failed else 0
 
@@ -199,6 +192,8 @@ class Runs:
             BadInput: a run ends with an error.
             RecordError: its records cannot be read.
         """
+        if len(self.releases) < 2:
+            return []
         tuned = f"--sim-profile={USUAL}"
         repeated = f"--reps={self.repetitions}"
         laws, laws_at = self._run("laws", *LAWS_RUN, tuned)
@@ -208,7 +203,7 @@ class Runs:
             own = "file" in adapter(self.engine).profiles and path.suffix.lower() != URDF
             words = f"--sim-scene={path}", "--sim-profile=file" if own else tuned
             part = file_name(path.stem, path.read_bytes())
-            scenes[path.name], reports[path.name] = self._run(part, *SCENE_RUN, *words)
+            scenes[str(path)], reports[str(path)] = self._run(part, *SCENE_RUN, *words)
         found = []
         for old, new in pairwise(self.releases):
             step = Step(self.engine, old, new, reports=reports, day=date.today().isoformat())
@@ -247,7 +242,7 @@ def _names(asked: Sequence[str]) -> list[str]:
     return list(asked) or usable
 
 
-def _plan(name: str, since: Since | None, seen: str) -> list[str]:
+def _plan(name: str, since: str, seen: str) -> list[str]:
     """The release to compare with, and those after it; the newest alone where none was seen.
 
     Raises:
@@ -256,30 +251,14 @@ def _plan(name: str, since: Since | None, seen: str) -> list[str]:
     """
     info = adapter(name).info
     found = [v for v in releases(info.distribution) if not info.refused(v)]
-    first = since.release if since else seen or found[-1]
+    if not found:
+        raise SimulatorError(f"its adapter runs with no release of {info.distribution}")
+    first = VersionedName.of(since.removesuffix(MINOR)).which or seen or found[-1]
     if since and first not in found:
         told = info.refused(first) or unreleased(info.distribution, first, found)
-        raise BadInput(f"--since {name}=={first}: {told or 'write it in full'}")
-    if first in found:
-        newer = found[found.index(first) + 1 :]
-    else:  # it was taken back
-        newer = [v for v in found if release_numbers(v) > release_numbers(first)]
-        first = next((v for v in reversed(found) if v not in newer), found[0])
-    return [first, *(newest_of_minors(newer) if since and since.minor else newer)]
-
-
-def _missing(name: str, plan: Sequence[str]) -> dict[str, str]:
-    """Releases that cannot be installed, and why.
-
-    Raises:
-        SimulatorError: that is so of the one to compare with.
-    """
-    found: dict[str, str] = {}
-    for release in plan if len(plan) > 1 else ():
-        try:
-            install_missing([f"{name}{RELEASE}{release}"], progress())
-        except SimulatorError as error:
-            if release == plan[0]:
-                raise
-            found[release] = str(error)
-    return found
+        raise BadInput(f"--since {since}: {told or 'write it in full'}")
+    if first not in found:  # it was taken back
+        older = [v for v in found if release_numbers(v) < release_numbers(first)]
+        first = older[-1] if older else found[0]
+    newer = found[found.index(first) + 1 :]
+    return [first, *(newest_of_minors(newer) if since.endswith(MINOR) else newer)]
