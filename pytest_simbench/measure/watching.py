@@ -58,7 +58,10 @@ def of_laws(step: Step, records: Sequence[Record]) -> Found:
     for history in law_histories(records):
         yield from ((True, sentence) for sentence in history.changed(step.new))
         if moved := history.moved(step.old, step.new):
-            yield False, f"kept by both, one {FACTOR:g} times as closely: {', '.join(moved)}"
+            yield (
+                False,
+                f"kept by both, by one at least {FACTOR:g} times as closely: {', '.join(moved)}",
+            )
 
 
 def of_tasks(step: Step, run: RunContents, limits: Sequence[Limit], steps: int) -> Found:

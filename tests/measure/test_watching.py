@@ -27,7 +27,7 @@ def test_a_law_changes_with_the_release_that_changed_it() -> None:
                *row("slip", 0.02, 0.02, 0.09, 0.09)]  # fmt: skip
     assert list(of_laws(STEP, records)) == [
         (True, "glide is broken (0.5x -> 4x)"),
-        (False, "kept by both, one 2 times as closely: spin (0.2x -> 0.001x)"),
+        (False, "kept by both, by one at least 2 times as closely: spin (0.2x -> 0.001x)"),
     ]
     assert list(of_laws(Step("engine", "1.10", "2.0"), records)) == []
 
