@@ -57,11 +57,8 @@ def of_laws(step: Step, records: Sequence[Record]) -> Found:
     """Which laws the release broke, mended or missed by more or less."""
     for history in law_histories(records):
         yield from ((True, sentence) for sentence in history.changed(step.new))
-        if moved := history.moved(step.old, step.new):
-            yield (
-                False,
-                f"kept by both, by one at least {FACTOR:g} times as closely: {', '.join(moved)}",
-            )
+        if moved := ", ".join(history.moved(step.old, step.new)):
+            yield False, f"kept by both, by one at least {FACTOR:g} times as closely: {moved}"
 
 
 def of_tasks(step: Step, run: RunContents, limits: Sequence[Limit], steps: int) -> Found:
@@ -93,11 +90,11 @@ def of_scene(step: Step, name: str, records: Sequence[Record]) -> Found:
     ends: dict[str, tuple[Settled, Who]] = {
         who[0]: (settled, who) for settled in settlings(records) for who in settled.written
     }
-    done = set(ends) or {record.simulator for record in records if record.ok}
-    ended = [simulator in done for simulator in step.names]
-    if not all(ended):
-        how = "no more" if ended[0] else "where it did not before" if ended[1] else "in neither"
-        yield any(ended), f"{name}: a repetition ends {how}"
+    if not ends.keys() >= {*step.names}:
+        done = ends or {record.simulator for record in records if record.ok}
+        old, new = (simulator in done for simulator in step.names)
+        how = "not in both" if old == new else "no more" if old else "where it did not before"
+        yield old != new, f"{name}: as it is written it ends {how}"
         return
     (settled, before), (_, after) = (ends[simulator] for simulator in step.names)
     gap, body = settled.apart(settled.written[before], settled.written[after])

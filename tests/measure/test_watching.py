@@ -84,9 +84,9 @@ def test_a_release_that_crashes_has_changed() -> None:
                               "within one release")]),
         ((0.0, 30.0), None, [(False, "bowl ends 30 mm elsewhere; no moved start was tried, so it "
                               "may be noise")]),
-        ((0.0, None), 2.0, [(True, "a repetition ends no more")]),
-        ((None, 0.0), None, [(True, "a repetition ends where it did not before")]),
-        ((None, None), None, [(False, "a repetition ends in neither")]),
+        ((0.0, None), 2.0, [(True, "as it is written it ends no more")]),
+        ((None, 0.0), None, [(True, "as it is written it ends where it did not before")]),
+        ((None, None), None, [(False, "as it is written it ends not in both")]),
     ],
 )  # fmt: skip
 def test_an_end_changes_where_the_scene_s_noise_does_not_explain_it(
