@@ -98,6 +98,23 @@ COMMANDS = (
                 Argument("arguments", str, "...", "tests and options of pytest",
                          argparse.REMAINDER),
             )),
+    Subcommand("watch", "cli.watch:watch", "run laws, tasks and scenes on releases that are new",
+            "It compares each with the one before it, writes a page, and ends with 1 where a "
+            "change is certain and larger than its limit, with 2 where something could not be "
+            "judged. The first run notes the newest releases.", (
+                Argument("engines", read.word, "NAME", "simulators (default: each that a package "
+                         "index has)", "*"),
+                Argument("--since", read.word, "NAME==RELEASE[:minor]", "all releases after this "
+                         "one, of each minor version the last; may come several times",
+                         action="append"),
+                Argument("--scene", read.file, "FILE", "a scene (MJCF, URDF) to run, too; may come "
+                         "several times", action="append"),
+                Argument("--reps", read.REPETITIONS, "N", "of both tasks (default: 12)"),
+                Argument("--limit", read.limits, "METRIC:LIMIT,...", "of the tasks' outcomes and "
+                         "costs (default: placed:5%%,hit:20%%,cpu_cost:20%%)"),
+                Argument("--output", read.file, "DIR", "folder of all runs, the page, and what was "
+                         "seen (default: .simbench/watch)"),
+            )),
     Subcommand("tune", "cli.tune:tune", "search settings that give this truth for the least cost",
             "It searches for three quarters of the budget, and judges on what it did not search "
             "by. The same command goes on where it was interrupted.", (

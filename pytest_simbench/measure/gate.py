@@ -128,10 +128,12 @@ def run_gate(
     metrics: Mapping[str, Sequence[Metric]],
     *,
     typed: bool = True,
+    beside: int = 0,
 ) -> GateReport:
     """Compare this run with the one of a baseline, by the metrics of each task.
 
     `typed` limits are for this very run: one that compares nothing fails it, else it is a note.
+    Where there are so many comparisons of runs `beside` this one, they share the error.
     """
     baseline, current = list(baseline), list(current)
     before, after = (
@@ -154,13 +156,16 @@ def run_gate(
         for limit in limits
         if limit.metric in after[test].known
     )
-    crashed, left = _rises({test: (before[test], after[test]) for test in common}, limits)
+    share = 1 / (1 + beside)
+    crashed, left = _rises({test: (before[test], after[test]) for test in common}, limits, share)
     limits = [limit for limit in limits if limit.metric != CRASHED.name]
     found = {
         limit: {test: _change(test, before[test], after[test], limit) for test in common}
         for limit in limits
     }
-    changes = _corrected((c for of_limit in found.values() for c in of_limit.values()), left)
+    changes = _corrected(
+        (c for of_limit in found.values() for c in of_limit.values()), left * share
+    )
     limited = {limit.metric for limit in limits}
     others = _corrected(
         _change(test, before[test], after[test], Limit(name, 0.0, True), both_ways=True)
@@ -181,7 +186,7 @@ def run_gate(
         f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
         f"to be significant among {len(changes)} comparisons"
         for change in changes
-        if _smallest_p(change.comparison) * len(changes) > ALPHA
+        if _smallest_p(change.comparison) * len(changes) > ALPHA * share
     ]
     named = differences({test: (before[test].records, after[test].records) for test in common})
     return GateReport(
@@ -265,7 +270,7 @@ def _broken(test: str, old: ResultSet, new: ResultSet) -> str:
 
 
 def _rises(
-    sides: Mapping[str, tuple[ResultSet, ResultSet]], limits: Iterable[Limit]
+    sides: Mapping[str, tuple[ResultSet, ResultSet]], limits: Iterable[Limit], share: float
 ) -> tuple[list[Change], float]:
     """By test the change of the share of crashed repetitions, which without a limit of its own may
     not rise; and the part of the error that is left for the limits."""
@@ -279,7 +284,8 @@ def _rises(
             loss = limit.loss(CRASHED, comparison.first, comparison.second)
             found.append(Change(test, CRASHED, limit, comparison, 1.0, loss))
     p_values, left = crashes.corrected(chances)
-    return [replace(c, p_value=p) for c, p in zip(found, p_values, strict=True)], left
+    shared = [min(1.0, p_value / share) for p_value in p_values]
+    return [replace(c, p_value=p) for c, p in zip(found, shared, strict=True)], left
 
 
 NO_MORE = Limit(CRASHED.name, 0.0, True)

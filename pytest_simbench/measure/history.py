@@ -40,6 +40,9 @@ FEWEST_OF_LAWS = 2
 FACTOR = 2.0
 """By which an error over its tolerance must grow or shrink: a tolerance is a bound (`BROKEN`)."""
 
+CLOSE = 0.1
+"""Of a tolerance: where both releases are as close to a law, nothing is told of it."""
+
 
 @dataclass(frozen=True)
 class History:
@@ -237,18 +240,34 @@ class LawHistory(History):
     def title(self) -> str:
         return f"{self.simulator}, {len(self.laws)} laws ({self.variant})"
 
+    def changed(self, release: str) -> list[str]:
+        """What one release changed, law by law."""
+        return [
+            _told(law.name, before, now)
+            for law in self.laws
+            for place, before, now in law.changes()
+            if self.releases[place] == release
+        ]
+
+    def moved(self, old: str, new: str) -> list[str]:
+        """Laws that two releases keep, one of them `FACTOR` times as closely."""
+        pairs = [
+            (law.name, law.reached[self.releases.index(old)], law.reached[self.releases.index(new)])
+            for law in self.laws
+        ]
+        return [
+            f"{name} ({times(before)} -> {times(now)})"
+            for name, before, now in pairs
+            if before
+            and now
+            and KEPT >= max(before.most, now.most) > CLOSE
+            and max(before.least, now.least) >= FACTOR * min(before.most, now.most)
+        ]
+
     def sentences(self) -> list[str]:
         """The same; then what all keep and miss, and which changed nothing."""
-        found = []
-        for place, release in enumerate(self.releases):
-            changed = [
-                _told(law.name, before, now)
-                for law in self.laws
-                for at, before, now in law.changes()
-                if at == place
-            ]
-            if changed:
-                found.append(f"{release}: {'; '.join(changed)}")
+        told = {release: self.changed(release) for release in self.releases}
+        found = [f"{release}: {'; '.join(changed)}" for release, changed in told.items() if changed]
         if not found:
             found.append("no release changed a law")
         if alike := [v for k, v in enumerate(self.releases) if k and self._alike(k)]:

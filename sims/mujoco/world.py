@@ -203,7 +203,7 @@ def _add_drive(spec: Any, joint: Joint) -> None:
     )
     drive.gainprm[0] = joint.stiffness
     drive.biasprm[1], drive.biasprm[2] = -joint.stiffness, -joint.damping
-    moved = _joint(spec, joint.name)
+    moved = _named(spec.joints, joint.name)
     moved.armature, moved.frictionloss, moved.springref = joint.armature, joint.friction, joint.rest
     # with MuJoCo's own 20 ms what friction holds creeps by 10 mm/s under 0.8 of its largest effort
     moved.solref_friction = [2 * spec.option.timestep, 1.0]
@@ -212,11 +212,9 @@ def _add_drive(spec: Any, joint: Joint) -> None:
         setattr(moved, field, [value, *polynomial[1:]] if len(polynomial) > 1 else value)
 
 
-def _joint(spec: Any, name: str) -> Any:
-    """The joint of that name."""
-    if hasattr(spec, "joint"):
-        return spec.joint(name)
-    return next(joint for joint in spec.joints if joint.name == name)  # before 3.3.0
+def _named(elements: Any, name: str) -> Any:
+    """The joint or body of that name; before 3.3.0 `MjSpec` does not look it up."""
+    return next(element for element in elements if element.name == name)
 
 
 def _couple(spec: Any, pair: Coupling) -> None:
@@ -243,7 +241,9 @@ def close_loops(spec: Any, prepared: PreparedRobot) -> None:
         links = (closure.first, closure.second)
         for link, frame in zip(links, frames(prepared, closure), strict=True):
             names.append(f"closure {k} {link}")
-            spec.body(link).add_site(name=names[-1], pos=frame.position, quat=frame.quaternion)
+            _named(spec.bodies, link).add_site(
+                name=names[-1], pos=frame.position, quat=frame.quaternion
+            )
         spec.add_equality(
             name=f"closure {k}",
             type=kinds.mjEQ_WELD if closure.rigid else kinds.mjEQ_CONNECT,

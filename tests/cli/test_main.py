@@ -92,6 +92,16 @@ def test_help_loads_nothing_large() -> None:
         ("report a --output b", "simbench report: b holds another run; give another --output"),
         ("bisect mujoco:3 placed", "*NAME:GOOD..BAD: write it as NAME:GOOD..BAD, with two *"),
         ("bisect mujoco:3..4 a-b", "*METRIC: give the name of a metric; *"),
+        ("watch nosuch", "simbench watch: unknown simulator 'nosuch'; choose from *mujoco*"),
+        ("watch ode", "simbench watch: ode: no package index has its releases; choose from *"),
+        ("watch mujoco==3.3.7", "*: name the simulator alone; --since mujoco==3.3.7 begins *"),
+        (
+            "watch --since mujoco",
+            "*: --since mujoco: write it as NAME==RELEASE or *",
+        ),
+        ("watch mujoco --scene no.xml", "*: --scene no.xml: there is no such file; give an *"),
+        ("watch mujoco --limit no:5%", "*: --limit: no metric is named 'no'; valid names: *"),
+        ("watch mujoco --output seen", "*: seen/watch.json: *; remove it to begin anew"),
         ("stats more", "*unrecognized arguments: more*"),
     ],
 )
@@ -108,6 +118,8 @@ def test_what_cannot_be_is_one_sentence(
     for name, text in (("a", first), ("b", first), ("bad", "no record\n"), ("empty", "")):
         (tmp_path / name).mkdir()
         (tmp_path / name / "records.jsonl").write_text(text)
+    (tmp_path / "seen").mkdir()
+    (tmp_path / "seen" / "watch.json").write_text('{"seen": 1}')
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path / "environments"))
     status, _, told = said(capsys, *words.split())

@@ -9,6 +9,7 @@ import textwrap
 from pathlib import Path
 
 import pytest
+import yaml
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -108,3 +109,15 @@ def test_build_workflow(pytester: pytest.Pytester) -> None:
          "*test_law[[]mujoco@build-headless-tower[]]*",
          "*test_conformance[[]mujoco-tuned-slides_flat[]]*"]
     )  # fmt: skip
+
+
+def test_watch_workflow() -> None:
+    """Its command is one, and what a watch saw is found again by the next one."""
+    text = (DOCS / "watch_workflow.yml").read_text("utf-8")
+    steps = yaml.safe_load(text)["jobs"]["watch"]["steps"]
+    lines = [step["run"] for step in steps if "simbench watch" in step.get("run", "")]
+    (_, *words), *others = map(shlex.split, lines)
+    given = pytest.importorskip("pytest_simbench.cli.main").parser().parse_args(words)
+    assert not others
+    assert steps[-1]["with"] == {"name": "watch", "path": given.output}
+    assert f"--name=watch --dir={given.output}" in text

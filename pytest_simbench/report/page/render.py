@@ -15,7 +15,8 @@ from markupsafe import Markup
 
 from pytest_simbench import __version__
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.report.model import changes
+from pytest_simbench.measure.watching import Step
+from pytest_simbench.report.model import changes, watched
 from pytest_simbench.report.model.document import Cell, Section, Table, capital
 from pytest_simbench.report.page.context import Shown
 
@@ -58,6 +59,20 @@ def fragment(sections: Sequence[Section]) -> str:
     """Sections as a part of somebody else's page, a notebook's for instance."""
     template = _environment().get_template("sections.html")
     return template.render(sections=sections, rows=_rows, symbols=SYMBOLS, capital=capital)
+
+
+def render_watch(steps: Sequence[Step], sentences: Sequence[str]) -> str:
+    """The page of a watch: its steps, and what its last run did."""
+    return (
+        _environment()
+        .get_template("watch.html")
+        .render(
+            told=watched.section(steps, sentences),
+            steps=steps,
+            style=Markup(_part("page.css")),
+            version=__version__,
+        )
+    )
 
 
 def _rows(found: Table) -> list[tuple[Cell, ...]]:

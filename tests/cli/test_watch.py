@@ -1,0 +1,166 @@
+"""`simbench watch` on an engine whose world stands still from release 1.3 on (`plugin.planted`)."""
+
+from __future__ import annotations
+
+import json
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from pytest_simbench.cli import watch
+from pytest_simbench.cli.main import main
+from pytest_simbench.cli.values import BadInput
+from pytest_simbench.ground.errors import SimulatorError
+from pytest_simbench.measure.watching import Step
+from tests.plugin.inner import importable
+from tests.plugin.planted import plant
+
+DRIVER = """
+import sys
+from pytest_simbench.cli import main, watch
+from tests.tiny import Falling
+
+watch.TASKS, watch.LIMITS = (Falling(),), "landed:5%"
+watch.TASKS_RUN = ("test_planted.py",)
+watch.LAWS_RUN += ("-k", "free_fall")
+watch.SCENE_RUN += ("-k", "headless and not mm and not step")
+sys.exit(main.main(sys.argv[1:]))
+"""
+"""The command with less work to do."""
+
+BALL = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
+<body name="ball" pos="0 0 1"><freejoint/><geom type="sphere" size="0.1"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.fixture
+def index(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The page of a package index."""
+    environments = pytester.path / "environments"
+    found = plant(pytester.path, environments)
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(environments))
+    monkeypatch.setenv("PIP_INDEX_URL", found.as_uri())
+    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", (pytester.path / "none").as_uri())
+    importable(monkeypatch, pytester.path / "site")
+    pytester.makepyfile(driver=DRIVER)
+    (pytester.path / "ball.xml").write_text(BALL)
+    return found / "planted-engine" / "index.html"
+
+
+def offer(index: Path, *versions: str) -> None:
+    """Have the index hold these releases alone."""
+    names = [f"planted_engine-{version}-py3-none-any.whl" for version in versions]
+    index.write_text("".join(f'<a href="{n}">{n}</a>\n' for n in names))
+
+
+def test_what_is_new_is_compared_with_what_was_seen(pytester: pytest.Pytester, index: Path) -> None:
+    offer(index, "1.1", "1.2", "1.3")
+    state = pytester.path / "w" / "watch.json"
+    state.parent.mkdir()
+    state.write_text('{"seen": {"planted": "1.2"}}')
+
+    words = ("watch", "planted", "--reps=1", "--scene=ball.xml", "--output=w")
+    result = pytester.run(sys.executable, "driver.py", *words)
+
+    assert result.ret == 1
+    result.stdout.fnmatch_lines(
+        ["planted: after 1.2 came 1.3",
+         "planted 1.3, after 1.2",
+         "  free_fall is broken (0.*x -> *x)",
+         "  (*: 1 and 1 repetitions are too few for a change of landed to be significant *",
+         "  (ball.xml: ball ends * mm elsewhere; no moved start was tried, so it may be noise)",
+         "page: w/index.html"]
+    )  # fmt: skip
+    page, text = (state.with_name(name).read_text() for name in ("index.html", "index.md"))
+    for told in (page, text):
+        assert "is broken (0.36x" in told
+        assert "planted: after 1.2 came 1.3" in told
+    told = json.loads(state.read_text())
+    assert told["seen"] == {"planted": "1.3"}
+    (step,) = told["steps"]
+    assert list(step["reports"]) == ["laws", "tasks", "ball.xml"]
+    for address in step["reports"].values():
+        assert f'href="{address}"' in page
+        assert (state.parent / address).is_file()
+
+
+RELEASES = ["3.2.0", "3.2.7", "3.3.0", "3.3.7", "4.0.0"]
+"""Of a made-up index; the adapter runs with nothing older than 3.2.4."""
+
+
+@pytest.fixture
+def work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
+    """The releases that were run, in place of runs; each step changes what its release says."""
+    ran: list[list[str]] = []
+
+    def judged(runs: watch.Runs, limits: object, steps: int) -> list[Step]:
+        if runs.releases[1:]:
+            ran.append([*runs.releases])
+        if "3.3.0" in runs.releases:
+            raise BadInput("the run ended with exit code 4")
+        return [Step(runs.engine, old, new, ["<b>"] if new == "4.0.0" else [])
+                for old, new in pairwise(runs.releases)]  # fmt: skip
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(watch, "releases", lambda distribution: RELEASES)
+    monkeypatch.setattr(watch.Runs, "judged", judged)
+    return ran
+
+
+def test_the_first_watch_notes_the_newest_and_the_next_begins_there(
+    work: list[list[str]], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(watch, "releases", lambda distribution: RELEASES[:-1])
+    assert main(["watch", "mujoco"]) == 0
+    assert "mujoco: nothing came after 3.3.7; --since mujoco==RELEASE begins" in (
+        capsys.readouterr().out
+    )
+    assert main(["watch", "mujoco"]) == 0
+    assert "mujoco: nothing came after 3.3.7\n" in capsys.readouterr().out
+    monkeypatch.setattr(watch, "releases", lambda distribution: ["3.2.7", "3.3.6", "4.0.0"])
+    assert main(["watch", "mujoco"]) == 1  # 3.3.7 was taken back
+    assert work == [["3.3.6", "4.0.0"]]
+    page = Path(".simbench/watch/index.html").read_text()
+    assert "&lt;b&gt;" in page
+    assert "<b>" not in page
+    assert main(["watch", "mujoco"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "ran", "told"),
+    [
+        ("--since mujoco==3.2.7:minor", 1, ["3.2.7", "3.3.7", "4.0.0"], "after 3.2.7 came 3.3.7"),
+        ("--since mujoco==3.2.7", 2, RELEASES[1:], "mujoco could not be judged: the run ended"),
+        ("mujoco --since mujoco==3.3.7", 1, ["3.3.7", "4.0.0"], "mujoco 4.0.0, after 3.3.7"),
+        ("--since mujoco==4.0.0", 0, None, "mujoco: nothing came after 4.0.0"),
+    ],
+)
+def test_a_watch_may_begin_earlier(
+    work: list[list[str]],
+    capsys: pytest.CaptureFixture[str],
+    words: str,
+    status: int,
+    ran: list[str] | None,
+    told: str,
+) -> None:
+    assert main(["watch", *words.split()]) == status
+    assert work == ([ran] if ran else [])
+    assert told in capsys.readouterr().out
+
+
+def test_one_that_cannot_be_judged_holds_up_no_other(
+    work: list[list[str]], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def of(distribution: str) -> list[str]:
+        if distribution == "sapien":
+            raise SimulatorError("no package index tells the releases of sapien")
+        return RELEASES
+
+    monkeypatch.setattr(watch, "releases", of)
+    assert main(["watch", "sapien", "mujoco"]) == 2
+    assert main(["watch", "sapien", "--since", "mujoco==3.3.7"]) == 1
+    told = capsys.readouterr().out
+    assert "sapien could not be judged: no package index tells" in told
+    assert "mujoco 4.0.0, after 3.3.7" in told
