@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.fitting import Fitting
     from pytest_simbench.tasks.goals import GoalTask, PickAndPlace, PushingToGoal, Reaching
     from pytest_simbench.tasks.holding import Holding
+    from pytest_simbench.tasks.impacting import Impacting
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
     from pytest_simbench.tasks.replaying import Log, Replaying
     from pytest_simbench.tasks.settling import Settling, rests_on
@@ -23,9 +24,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArmFollowing", "ArmPushing", "CorrectedArmFollowing", "CurvePushing", "Fitting", "GoalTask",
-    "Holding", "Jitter", "LeaningTowers", "Log", "Moment", "Outcome", "PickAndPlace", "Pushing",
-    "PushingToGoal", "Reaching", "Replaying", "Settling", "Stacking", "Task", "Throwing", "Tossing",
-    "rests_on",
+    "Holding", "Impacting", "Jitter", "LeaningTowers", "Log", "Moment", "Outcome", "PickAndPlace",
+    "Pushing", "PushingToGoal", "Reaching", "Replaying", "Settling", "Stacking", "Task", "Throwing",
+    "Tossing", "rests_on",
 ]  # fmt: skip
 
 _MODULES = {
@@ -35,6 +36,7 @@ _MODULES = {
     "fitting": ("Fitting",),
     "goals": ("GoalTask", "PickAndPlace", "PushingToGoal", "Reaching"),
     "holding": ("Holding",),
+    "impacting": ("Impacting",),
     "pushing": ("CurvePushing", "Pushing"),
     "replaying": ("Log", "Replaying"),
     "settling": ("Settling", "rests_on"),
