@@ -127,7 +127,7 @@ def clean_impacts(toss: int, rows: FloatArray) -> list[Impact]:
     """The clean impacts of a toss, whose rows are x, z [m] and angle [rad], (n, 3).
 
     Clean is one that has two arcs of free flight, of `FLIGHT` rows, with one row between them or
-    none, which meet in between, and where one corner alone is near the table.
+    none, which meet in between, where one corner alone is near the table, and is pushed up.
     """
     rows = rows - [0.0, 0.0, ANGLE_BIAS]
     change = np.diff(rows, 2, axis=0) * RATE + [0.0, _G / RATE, 0.0]
@@ -174,6 +174,7 @@ def _meeting(toss: int, order: int, before: Arc, after: Arc, between: float) -> 
         and 0 <= time <= between
         and abs(place[1] - height) <= TABLE
         and abs(tilt(place[2])) >= LEAST_TILT
+        and parting[1] > abs(parting[0])  # else it struck something at its side
     )
     place[1] = height
     return [Impact(toss, order, place, before[1] - fall, after[1] - fall)] if good else []

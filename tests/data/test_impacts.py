@@ -17,13 +17,19 @@ from tests.conftest import measured
 BEFORE, AFTER = np.array([-0.7, -2.4, 3.0]), np.array([-0.4, 0.9, -20.0])
 
 
-def toss(at: float = 20.3, angle: float = 0.4, rows: int = 40, height: float = 0.0) -> FloatArray:
-    """Rows as the source has them of a square that strikes `at` a row, that high above the table
-    [m], with an angle [rad]."""
+def toss(
+    at: float = 20.3,
+    angle: float = 0.4,
+    height: float = 0.0,
+    rows: int = 40,
+    after: FloatArray = AFTER,
+) -> FloatArray:
+    """Rows as the source has them of a square that strikes `at` a row, with an angle [rad], that
+    high above the table [m]."""
     time = ((np.arange(rows) - at) / impacts.RATE)[:, None]
     place = np.array([-0.4, height - corner(angle)[1], angle + ANGLE_BIAS])
     fallen = np.array([0.0, STANDARD_GRAVITY[2] / 2, 0.0]) * time**2
-    return place + np.where(time < 0, BEFORE, AFTER) * time + fallen
+    return place + np.where(time < 0, BEFORE, after) * time + fallen
 
 
 @pytest.mark.parametrize("at", [20.0, 20.3, 20.95])
@@ -42,7 +48,8 @@ def test_what_is_no_clean_impact_of_one_corner_is_left_out() -> None:
     later[21:] += AFTER * 0.002  # the arcs do not meet
     slow[20:22] = slow[19]  # more than a row's time between the arcs
     bent[26:] += np.outer(np.arange(14) / impacts.RATE, [0.0, 0.3, 0.0])  # struck again, weakly
-    for rows in (later, slow, bent, toss(angle=0.05), toss(height=0.004), toss(at=8.5)):
+    wall = toss(after=BEFORE * [-1.0, 0.9, -1.0])
+    for rows in (later, slow, bent, wall, toss(angle=0.05), toss(height=0.004), toss(at=8.5)):
         assert clean_impacts(1, rows) == []
     assert clean_impacts(1, toss()[:20]) == []  # none at all
 
