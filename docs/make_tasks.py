@@ -12,7 +12,6 @@ from tables import NAMES, Kept, Line, numbers, table
 
 from pytest_simbench.data import Impacts
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.model.cells import mean_interval
 from pytest_simbench.report.model.pooling import spread
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks import Impacting, Pushing
@@ -162,16 +161,15 @@ def tossing() -> str:
 
 def impacting() -> str:
     """What was chosen for each simulator, and mean and 95 % interval over the impacts."""
-    metrics = Impacting(Impacts(())).metrics
+    metric = Impacting(Impacts(())).metrics[0]
     rows = []
     for simulator, name in NAMES.items():
         lines = EXPERIMENTS["impacting"].lines(simulator=simulator, profile="real")
-        if lines:
-            found = [spread(numbers(lines, metric.name), metric) for metric in metrics]
-            rows.append(
-                [name, *(lines[0][key] for key in SURFACE)]
-                + [" ".join(mean_interval(*p).lines) for p in zip(found, metrics, strict=True)]
-            )
+        found = spread(numbers(lines, metric.name), metric)
+        if found:
+            error = f"{found.mean:.3f} [{found.low:.3f}, {found.high:.3f}]"
+            relative = f"{fmean(numbers(lines, 'relative_error')):.0f}"
+            rows.append([name, *(lines[0][key] for key in SURFACE), error, relative])
     return table(("simulator", *SURFACE, "velocity error m/s", "relative error %"), rows)
 
 

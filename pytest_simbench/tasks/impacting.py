@@ -74,7 +74,7 @@ class Impacting(MeasuredTask[Impact]):
                    doc="of the velocity after the impact; one of rotation counts as that speed of "
                        "the centre which has the same energy"),
             Metric("relative_error", "relative error", unit="%", better="lower", least=0,
-                   doc="the velocity error in percent of the real velocity after the impact"),
+                   doc="the velocity error in percent of the real velocity right after the impact"),
         )  # fmt: skip
 
     @property
@@ -128,7 +128,7 @@ class Impacting(MeasuredTask[Impact]):
         return Outcome(
             {
                 "velocity_error": error,
-                "relative_error": 100 * error / float(np.linalg.norm(real * square.SCALE)),
+                "relative_error": 100 * error / float(np.linalg.norm(impact.after * square.SCALE)),
             },
             {
                 "impact": impact.number,
