@@ -160,7 +160,8 @@ def tossing() -> str:
 
 
 def impacting() -> str:
-    """What was chosen for each simulator, and mean and 95 % interval over the impacts."""
+    """What was chosen for each simulator, and mean and 95 % interval over the impacts. Then laws of
+    impacts without an engine, on the same impacts (docs/reality.md)."""
     metric = Impacting(Impacts(())).metrics[0]
     rows = []
     for simulator, name in NAMES.items():
@@ -170,6 +171,7 @@ def impacting() -> str:
             error = f"{found.mean:.3f} [{found.low:.3f}, {found.high:.3f}]"
             relative = f"{fmean(numbers(lines, 'relative_error')):.0f}"
             rows.append([name, *(lines[0][key] for key in SURFACE), error, relative])
+    rows += [[*line.values()] for line in Kept("impact_laws", (), (), lambda record: None).lines()]
     return table(("simulator", *SURFACE, "velocity error m/s", "relative error %"), rows)
 
 
