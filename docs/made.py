@@ -44,6 +44,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "arms": make_tasks.arms,
     "pushing": make_tasks.pushing,
     "tossing": make_tasks.tossing,
+    "impacting": make_tasks.impacting,
     "arm_pushing": make_tasks.arm_pushing,
     "arm_following": make_tasks.arm_following,
     "source_simulations": make_tasks.source_simulations,

@@ -10,9 +10,11 @@ from statistics import fmean, pstdev
 from published_runs import METRICS, TASKS, Run
 from tables import NAMES, Kept, Line, numbers, table
 
+from pytest_simbench.data import Impacts
 from pytest_simbench.records.record import Record
+from pytest_simbench.report.model.pooling import spread
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.tasks import Pushing
+from pytest_simbench.tasks import Impacting, Pushing
 
 ROBOTS = {"ur5": "UR5", "ur10": "UR10", "xarm7": "xArm 7", "so101": "SO-101"}
 ARM_KEY = ("robot", "task", "profile", "simulator", "changed", "seed")
@@ -30,8 +32,11 @@ SHOWN = {
 WAYS = ("line", "curve")
 PUSHED = {"position_error": "position mm", "heading_error": "heading deg", "path_error": "path mm"}
 
+SURFACE = ("friction", "restitution")
+"""Of impacts: chosen for each simulator."""
 REAL = {
     "tossing": ("position_error", "rotation_error"),
+    "impacting": ("velocity_error", "relative_error", *SURFACE),
     "arm_pushing": ("displacement", "displacement_error", "turn_error", "way_error"),
     "arm_following": ("hand_error", "rest_error", "displacement"),
     "arm_following_corrected": ("hand_error", "rest_error", "displacement"),
@@ -62,10 +67,11 @@ def _of_push(record: Record) -> dict[str, object] | None:
 def _of_experiment(task: str, record: Record) -> dict[str, object] | None:
     if record.task != task:
         return None
-    number = str((record.details.get("data") or ["", ""])[1])
+    number = str(record.notes.sample[1]) if record.notes.sample else ""
     if task in FOLLOWING:
         number = record.details.get("run", number)
-    return {**record.details, **record.metrics, "number": number}
+    chosen = {name: record.settings.get(f"task.{name}") for name in SURFACE}
+    return {**record.details, **record.metrics, **chosen, "number": number}
 
 
 ARMS = Kept(
@@ -151,6 +157,22 @@ def tossing() -> str:
     errors = ("position %", "rotation deg")
     heads = [f"{profile}: {error}" for profile in PROFILES for error in errors]
     return table(("simulator", *heads), rows)
+
+
+def impacting() -> str:
+    """What was chosen for each simulator, and mean and 95 % interval over the impacts. Then laws of
+    impacts without an engine, on the same impacts (docs/reality.md)."""
+    metric = Impacting(Impacts(())).metrics[0]
+    rows = []
+    for simulator, name in NAMES.items():
+        lines = EXPERIMENTS["impacting"].lines(simulator=simulator, profile="real")
+        found = spread(numbers(lines, metric.name), metric)
+        if found:
+            error = f"{found.mean:.3f} [{found.low:.3f}, {found.high:.3f}]"
+            relative = f"{fmean(numbers(lines, 'relative_error')):.0f}"
+            rows.append([name, *(lines[0][key] for key in SURFACE), error, relative])
+    rows += [[*line.values()] for line in Kept("impact_laws", (), (), lambda record: None).lines()]
+    return table(("simulator", *SURFACE, "velocity error m/s", "relative error %"), rows)
 
 
 def arm_pushing() -> str:

@@ -120,7 +120,7 @@ COMMANDS = (
             "by. The same command goes on where it was interrupted.", (
                 Argument("target", read.file, "TARGET", "a test, FILE.py::TEST; laws:NAME,... "
                          "(laws or phenomena); stacking, throwing or pushing; or measured data: "
-                         "tosses, pushes, commands"),
+                         "tosses, impacts, pushes, commands"),
                 Argument("--sim", read.simulators, "NAME,...", "whose settings, or all, one search "
                          "after the other; simbench list --settings NAME prints them"),
                 Argument("--profile", read.profiles, "NAME|FILE", "today's (default: tuned)"),

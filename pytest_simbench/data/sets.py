@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pytest_simbench.data import pushes, tosses
+from pytest_simbench.data import impacts, pushes, tosses
 from pytest_simbench.data.measured import DataError, DataMissing
 
 VARIABLE = "SIMBENCH_DATA"
@@ -75,6 +75,17 @@ SETS = {
             licence="BSD-3-Clause",
             read=pushes.read,
             convert=pushes.convert,
+        ),
+        DataSet(
+            name=impacts.NAME,
+            title="500 tosses of a square in a plane",
+            repository="DAIRLab/ImpactModeling",
+            commit="f6c28898845da6d48efdd6c1c696db2fb3716edf",
+            files=("Wang/Wang-Mason Square/dice-data-processed/traj_",),
+            sha256="462743c984cb61dd3b6ec5e381377b80d631d1ae697b603fd817b4ccd4f6034b",
+            licence="BSD-3-Clause",
+            read=impacts.read,
+            convert=impacts.convert,
         ),
     )
 }

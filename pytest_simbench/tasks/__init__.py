@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.fitting import Fitting
     from pytest_simbench.tasks.goals import GoalTask, PickAndPlace, PushingToGoal, Reaching
     from pytest_simbench.tasks.holding import Holding
+    from pytest_simbench.tasks.impacting import Impacting
     from pytest_simbench.tasks.nesting import Nesting
     from pytest_simbench.tasks.pouring import Pouring
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
@@ -26,9 +27,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArmFollowing", "ArmPushing", "Carrying", "CorrectedArmFollowing", "CurvePushing", "Fitting",
-    "GoalTask", "Holding", "Jitter", "LeaningTowers", "Log", "Moment", "Nesting", "Outcome",
-    "PickAndPlace", "Pouring", "Pushing", "PushingToGoal", "Reaching", "Replaying", "Settling",
-    "Stacking", "Task", "Throwing", "Tossing", "rests_on",
+    "GoalTask", "Holding", "Impacting", "Jitter", "LeaningTowers", "Log", "Moment", "Nesting",
+    "Outcome", "PickAndPlace", "Pouring", "Pushing", "PushingToGoal", "Reaching", "Replaying",
+    "Settling", "Stacking", "Task", "Throwing", "Tossing", "rests_on",
 ]  # fmt: skip
 
 _MODULES = {
@@ -39,6 +40,7 @@ _MODULES = {
     "fitting": ("Fitting",),
     "goals": ("GoalTask", "PickAndPlace", "PushingToGoal", "Reaching"),
     "holding": ("Holding",),
+    "impacting": ("Impacting",),
     "nesting": ("Nesting",),
     "pouring": ("Pouring",),
     "pushing": ("CurvePushing", "Pushing"),

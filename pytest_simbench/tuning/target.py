@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.data import pushes, tosses
+from pytest_simbench.data import impacts, pushes, tosses
 from pytest_simbench.data.sets import read
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.laws import LAWS, Law
@@ -19,7 +19,15 @@ from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.records.phenomena import PHENOMENA
 from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
-from pytest_simbench.tasks import ArmFollowing, ArmPushing, Pushing, Stacking, Throwing, Tossing
+from pytest_simbench.tasks import (
+    ArmFollowing,
+    ArmPushing,
+    Impacting,
+    Pushing,
+    Stacking,
+    Throwing,
+    Tossing,
+)
 from pytest_simbench.tasks.base import Task
 from pytest_simbench.tasks.measured import MeasuredTask
 from pytest_simbench.tasks.on_scene import OnScene
@@ -35,6 +43,7 @@ TASKS: Mapping[str, tuple[type[Task], str]] = {
 
 REAL: Mapping[str, tuple[Any, str, str]] = {
     "tosses": (Tossing, tosses.NAME, "position_error"),
+    "impacts": (Impacting, impacts.NAME, "velocity_error"),
     "pushes": (ArmPushing, pushes.NAME, "displacement_error"),
     "commands": (ArmFollowing, pushes.NAME, "hand_error"),
 }

@@ -112,6 +112,9 @@ def test_real_experiments_are_of_held_out_motions() -> None:
     tosses = {int(line["number"]) for line in make_tasks.EXPERIMENTS["tossing"].lines()}
     assert len(tosses) == 95
     assert all(number % 2 for number in tosses)
+    impacts = {int(line["number"]) for line in make_tasks.EXPERIMENTS["impacting"].lines()}
+    assert len(impacts) == 72
+    assert all(number // 100 % 2 for number in impacts)
     runs = {int(line["number"]) for line in make_tasks.EXPERIMENTS["arm_pushing"].lines()}
     assert runs == {3, 7, 11, 15, 19, 31}
     for task in make_tasks.FOLLOWING:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.data import Tosses
+from pytest_simbench.data import Impacts, Tosses
 from pytest_simbench.data.pushes import ArmRuns
 from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.limits import CRASHED
@@ -15,6 +15,7 @@ from pytest_simbench.measure.verdicts import Verdict, at_least, at_most, confide
 from pytest_simbench.tasks import (
     ArmFollowing,
     ArmPushing,
+    Impacting,
     Pushing,
     Stacking,
     Task,
@@ -29,6 +30,7 @@ TASKS: dict[str, tuple[Task, ...]] = {
     "pushing": (Pushing(),),
     "reality": (
         Tossing(Tosses(())),
+        Impacting(Impacts(())),
         ArmPushing(ArmRuns((), Path())),
         ArmFollowing(ArmRuns((), Path())),
     ),
@@ -69,6 +71,7 @@ def test_all_claims_were_found() -> None:
             for name in ("crashed", "position_error", "heading_error", "path_error", "tipped")
         ),
         *(("reality", name) for name in ("crashed", "position_error", "position_error")),
+        *(("reality", name) for name in ("crashed", "velocity_error", "velocity_error")),
         *(("reality", name) for name in ("turn_error", "hand_error", "hand_error")),
     ]
 
