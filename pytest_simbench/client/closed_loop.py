@@ -35,14 +35,8 @@ class ClosedLoop:
     """One loop under way: look, answer, look again, until it is over.
 
     Args:
-        process: with a loaded scene.
-        scene: that scene.
-        rhythm: of the policy.
         timestep: of the simulator [s].
         seconds: of simulated time at most.
-        kinematics: of the robot.
-        looking: what is shown.
-        goal: of the task.
 
     Attributes:
         observation: the newest that the policy may see.
@@ -141,10 +135,8 @@ class Episode:
         rhythm: how often, and how late.
         until: simulated seconds, or what ends the loop once it holds of an observation.
         at_most: seconds that the loop lasts if that never holds.
-        seed: of the episode.
         looking: what the policy is shown beside the state.
         inside: whether it runs in the worker.
-        goal: of the task.
     """
 
     policy: Any

@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_simbench.description.stl import read_stl, written_stl
+from pytest_simbench.description.mesh_check import read_stl, written_stl
 from pytest_simbench.description.urdf import Shape
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import FloatArray, Polytope, Pose
+from pytest_simbench.scene.polytope import MOST
 
 _GRID = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 DIRECTIONS: FloatArray = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
@@ -143,3 +144,26 @@ def _read_obj(data: bytes) -> FloatArray:
         return np.array(rows, dtype=float).reshape(-1, 3)
     except ValueError:
         return np.empty((0, 3))
+
+
+def cylinder_hull(radius: float, half: float) -> tuple[FloatArray, float]:
+    """Corners of a cylinder along z of that radius and half length [m], and by how much their hull
+    is smaller at most [m]: of links every engine reads boxes and meshes alone."""
+    angles = np.linspace(0, 2 * np.pi, MOST // 2, endpoint=False)
+    ring = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    ends = [np.hstack([ring, np.full((len(ring), 1), z)]) for z in (-half, half)]
+    return np.concatenate(ends), radius * (1 - float(np.cos(np.pi / len(ring))))
+
+
+def capsule_hull(radius: float, half: float = 0.0) -> tuple[FloatArray, float]:
+    """The same of a capsule, `half` the length between its ends' middles; 0: a sphere."""
+    ways = directions(MOST)
+    gap = radius * (1 - float((directions(400) @ ways.T).max(axis=1).min()))
+    return radius * ways + np.array([0.0, 0.0, half]) * np.sign(ways[:, 2:]), gap
+
+
+def directions(count: int) -> FloatArray:
+    """Unit vectors, spread evenly over all directions (a spiral), (count, 3)."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    angle, flat = np.pi * (3 - np.sqrt(5)) * np.arange(count), np.sqrt(1 - z**2)
+    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)

@@ -193,7 +193,6 @@ class PreparedRobot:
 
         Args:
             mimic: say that the other fingers follow the first.
-            visuals: draw each collision shape.
         """
         root = ET.Element("robot", name=self.robot.name)
         for link in self.links.values():

@@ -52,7 +52,6 @@ class Film:
     folder is there when it is whole.
 
     Attributes:
-        frames: pictures so far.
         problem: why there are no more, as a sentence.
     """
 

@@ -1,9 +1,8 @@
 """The declarative world: bodies, robot, gravity, friction, gains; frozen, in SI units."""
 
-from pytest_simbench.scene.bodies import Box, Capsule, ConvexMesh, Cylinder, Sphere
+from pytest_simbench.scene.bodies import Box, Capsule, Compound, ConvexMesh, Cylinder, Sphere
 from pytest_simbench.scene.body import Body, Solid, Wrench
 from pytest_simbench.scene.checks import SceneError
-from pytest_simbench.scene.compound import Compound
 from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.scene.polytope import Polytope, principal
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix

@@ -23,7 +23,6 @@ class SetPoints:
     """Of all joints: those that a policy's answers lead to, one period after the other.
 
     Args:
-        robot: that is commanded.
         position: set points at the start, (n_joints,).
         effort: fed forward at the start, (n_joints,), where there is no model to tell it.
         period: of the policy [s].
@@ -144,7 +143,6 @@ class Sight:
     Args:
         scene: that is loaded; it has a robot.
         kinematics: of the robot; None inside the worker.
-        goal: of the task.
     """
 
     def __init__(
@@ -173,7 +171,6 @@ class Sight:
             joints: positions and velocities, (2, n_joints).
             told: the set points in force: position, velocity, effort, (n_joints,) each.
             bodies: rows of the free bodies, (n_free, 13).
-            more: forces and picture.
         """
         return Observation(
             time, joints[0], joints[1], np.asarray(told), bodies, self._names,

@@ -28,7 +28,6 @@ class Approach:
     """A cube, its face parallel to a link's farthest point in some direction, near to it.
 
     Attributes:
-        link: that is touched first.
         direction: of flight, unit vector.
         start: of the cube's centre [m].
         distance: that the cube can fly [m].

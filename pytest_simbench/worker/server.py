@@ -26,8 +26,8 @@ from pytest_simbench import __version__
 from pytest_simbench.description.links import check_names
 from pytest_simbench.description.robot_files import received
 from pytest_simbench.parity.compare import check
-from pytest_simbench.parity.memory import remembering
 from pytest_simbench.parity.quantities import expected_quantities
+from pytest_simbench.parity.readback import remembering
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo

@@ -58,7 +58,6 @@ class Stepper:
     """Steps one simulator through trajectories and waits, and keeps its clocks.
 
     Attributes:
-        states: reads the simulator's clock and states.
         acting: what moves bodies from outside; None: nothing.
         film: every how many steps since loading a picture is due, and what takes one, outside of
             the measured stepping time; None: no pictures.

@@ -16,13 +16,7 @@ from pytest_simbench.scene import Coupling
 
 
 class Couplings:
-    """Holds q_follower - ratio q_leader at the offset.
-
-    Args:
-        skeleton: of the robot.
-        names: of its degrees of freedom.
-        pairs: what moves together.
-    """
+    """Holds q_follower - ratio q_leader at the offset."""
 
     def __init__(self, skeleton: Any, names: Sequence[str], pairs: Sequence[Coupling]) -> None:
         self._skeleton = skeleton

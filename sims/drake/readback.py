@@ -33,7 +33,6 @@ class Part:
     """The ground, a body or a link.
 
     Attributes:
-        body: of Drake.
         shapes: its own, or those of the world that are meant.
         frame: in the body's; that of a fixed body, which is a shape of the world, is the shape's.
     """

@@ -21,9 +21,7 @@ class Drives:
     """The drives of a robot.
 
     Args:
-        server: runs the world.
         model: of the robot, an entity of the bindings.
-        robot: whose drives they are.
         timestep: [s].
         gain: share of the position error that a step corrects.
         coupled: whether the engine couples the fingers; else the others are led by the first.

@@ -16,9 +16,6 @@ class Wrenches:
     """Forces and torques on the free bodies.
 
     Args:
-        ecm: the world's entities and components.
-        bodies: the scene's free bodies.
-        links: theirs, entities of the bindings.
         timestep: [s].
         turned: whether the engine takes a torque in the body's axes, not in the world's.
 

@@ -15,9 +15,8 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
 
-from ..mujoco.imported import Told, compared, deviations, pairs
-from ..mujoco.own_file import OwnFile
-from ..mujoco.touching import collide
+from ..mujoco.constraints import collide
+from ..mujoco.own_file import OwnFile, Told, compared, deviations, pairs
 from .engine import array_of, contact_parameters, numbers, of_collider
 from .readback import ReadBack
 
@@ -58,7 +57,6 @@ class GenesisFile:
     Args:
         scene: as `OwnFile`.
         timestep: [s].
-        world: to which it is added.
 
     Raises:
         NotSupportedError: as `OwnFile`, or the importer refuses the file or leaves out a part.

@@ -55,7 +55,6 @@ class Part:
 
     Attributes:
         body: MuJoCo's number of what it is a part of; 0: the world.
-        geoms: numbers of its shapes.
         place, turn: of its frame in the world, (3,) [m] and (3, 3).
     """
 

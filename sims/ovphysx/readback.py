@@ -45,7 +45,6 @@ class Part:
     """A body or link.
 
     Attributes:
-        path: its prim.
         values: what PhysX tells of all prims of its kind, by attribute and prim.
         made: whose it is: the scene's, which says where its shapes are to be looked for.
     """
@@ -197,7 +196,6 @@ def wrenches(told: FloatArray, prepared: PreparedRobot, positions: FloatArray) -
     Args:
         told: by PhysX of each link by its number in `prepared.links`, (n_links, 6), in the axes of
             the frame of the joint above it, whose x is the joint's axis.
-        prepared: whose joints they are.
         positions: of the joints, (n_joints,).
     """
     names = prepared.robot.joint_names

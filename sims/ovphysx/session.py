@@ -50,9 +50,6 @@ class Session:
     Args:
         text: the stage, `.usda`.
         threads: workers of PhysX; 0 computes in the calling thread.
-
-    Attributes:
-        physx: the engine.
     """
 
     def __init__(self, text: str, threads: int) -> None:
@@ -151,7 +148,6 @@ class Session:
         """How far a collider reaches in each of `DIRECTIONS`, in the frame at `pose`, (26,) [m].
 
         Args:
-            collider: its prim.
             pose: of the frame, in the world.
             aim: a point in or near the collider, in the frame.
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pytest_simbench.description.mesh_check import written_stl
 from pytest_simbench.description.shapes import (
     DIRECTIONS,
     box_corners,
@@ -17,7 +18,6 @@ from pytest_simbench.description.shapes import (
     reach,
     round_reach,
 )
-from pytest_simbench.description.stl import written_stl
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import DescriptionError
 

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.description.links import check_names, check_robot
-from pytest_simbench.description.mesh_check import LARGEST_MESH
-from pytest_simbench.description.stl import read_stl, written_stl
+from pytest_simbench.description.mesh_check import LARGEST_MESH, read_stl, written_stl
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.motion.model import RobotModel
