@@ -39,8 +39,12 @@ def reach(points: FloatArray) -> FloatArray:
     return np.asarray((np.atleast_2d(points) @ DIRECTIONS.T).max(axis=0))
 
 
-def round_reach(radius: float, length: float = 0.0, pose: Pose | None = None) -> FloatArray:
-    """The `reach` of a sphere, or of a capsule along the z axis of a pose, (26,) [m].
+Outline = tuple[str, FloatArray]
+"""Of a collision shape its kind, one of `OUTLINES`, and its `reach`."""
+
+
+def a_round(radius: float, length: float = 0.0, pose: Pose | None = None) -> Outline:
+    """A sphere, or a capsule along the z axis of a pose.
 
     Args:
         radius: [m].
@@ -48,32 +52,34 @@ def round_reach(radius: float, length: float = 0.0, pose: Pose | None = None) ->
         pose: of its centre in the frame; by default the frame itself.
     """
     pose = pose or Pose()
-    axis = pose.rotation()[:, 2]
-    along: FloatArray = np.abs(DIRECTIONS @ axis) * length / 2
-    return np.asarray(DIRECTIONS @ np.asarray(pose.position) + along + radius)
+    along: FloatArray = np.abs(DIRECTIONS @ pose.rotation()[:, 2]) * length / 2
+    return "rounds", np.asarray(DIRECTIONS @ np.asarray(pose.position) + along + radius)
 
 
-def cylinder_reach(radius: float, length: float, pose: Pose | None = None) -> FloatArray:
-    """The `reach` of a cylinder along the z axis of a pose; arguments as of `round_reach`."""
-    pose = pose or Pose()
+def a_cylinder(radius: float, length: float, pose: Pose) -> Outline:
+    """A cylinder along the z axis of a pose; arguments as of `a_round`."""
     along = DIRECTIONS @ pose.rotation()[:, 2]
     across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
     reached = np.abs(along) * length / 2 + across * radius
-    return np.asarray(DIRECTIONS @ np.asarray(pose.position) + reached)
+    return "rounds", np.asarray(DIRECTIONS @ np.asarray(pose.position) + reached)
 
 
-def box_reach(size: Sequence[float] | FloatArray, pose: Pose) -> FloatArray:
-    """The `reach` of a box of edge lengths `size` [m] whose centre is at a pose, (26,) [m]."""
-    return reach(placed(box_corners(size), pose))
+def a_box(size: Sequence[float] | FloatArray, pose: Pose) -> Outline:
+    """A box of edge lengths `size` [m] whose centre is at a pose."""
+    return "boxes", reach(placed(box_corners(size), pose))
+
+
+def a_mesh(corners: FloatArray, pose: Pose) -> Outline:
+    """A mesh by its corners in the frame at a pose, (n, 3) [m]."""
+    return "meshes", reach(placed(corners, pose))
 
 
 def outlines(
-    shapes: Iterable[tuple[str, FloatArray]], asked: Sequence[FloatArray] | None = None
+    shapes: Iterable[Outline], asked: Sequence[FloatArray] | None = None
 ) -> dict[str, FloatArray]:
     """The quantities `boxes`, `meshes` and `rounds` of a body or link.
 
     Args:
-        shapes: each by its kind, one of `OUTLINES`, and its `reach`.
         asked: reaches of the same shapes to order them by, from whoever measures them with an error
             that may change the order.
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import outlines
+from pytest_simbench.description.shapes import Outline, outlines
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.parity.quantities import named, touches
 from pytest_simbench.scene import Body, Coupling, FloatArray, Robot, Scene
@@ -84,8 +84,8 @@ class ReadBack(ABC):
         """Of the frame of a body or link, (7,)."""
 
     @abstractmethod
-    def shapes(self, part: Any) -> Iterable[tuple[str, FloatArray]]:
-        """Of a body or link, each by its kind and its reach, see `shapes.outlines`."""
+    def shapes(self, part: Any) -> Iterable[Outline]:
+        """Of a body or link."""
 
     def asked(self, part: Any) -> list[FloatArray] | None:
         """The reaches that the scene asks for, of an engine whose shapes are measured; None: as

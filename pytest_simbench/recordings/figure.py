@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pytest_simbench.description.mesh_check import read_stl
 from pytest_simbench.description.urdf import MovingJoint, PreparedRobot
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
-from pytest_simbench.scene.wire import Wire
+from pytest_simbench.scene.checks import Wire
 
 
 @dataclass(frozen=True, eq=False)

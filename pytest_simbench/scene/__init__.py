@@ -8,7 +8,7 @@ from pytest_simbench.scene.polytope import Polytope, principal
 from pytest_simbench.scene.pose import FloatArray, Pose, Quaternion, Vector3, rotation_matrix
 from pytest_simbench.scene.robot import Closure, Coupling, Gripper, Joint, MotionLimits, Robot
 from pytest_simbench.scene.scene import STANDARD_GRAVITY, Scene, Start
-from pytest_simbench.scene.trajectory import Trajectory
+from pytest_simbench.scene.set_points import Trajectory
 
 __all__ = [
     "STANDARD_GRAVITY",

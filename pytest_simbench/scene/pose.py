@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene.wire import Wire
+from pytest_simbench.scene.checks import Wire
 
 FloatArray = NDArray[np.float64]
 Vector3 = tuple[float, float, float]

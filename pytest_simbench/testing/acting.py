@@ -19,7 +19,7 @@ from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import check
 from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS
 from pytest_simbench.testing.subject import Subject, asked, require, require_close
-from pytest_simbench.worker.acting import prescribed
+from pytest_simbench.worker.stepping import prescribed
 
 
 @check()

@@ -37,7 +37,6 @@ from pytest_simbench.simulator.info import (
     importable,
 )
 from pytest_simbench.simulator.settings import changed
-from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.loop import Loop, told_forces
 from pytest_simbench.worker.loop import inside as run_inside
 from pytest_simbench.worker.loop import outside as run_outside
@@ -47,7 +46,7 @@ from pytest_simbench.worker.state import (
     checked_quantities,
     checked_state,
 )
-from pytest_simbench.worker.stepping import Stepper
+from pytest_simbench.worker.stepping import Acting, Stepper
 from pytest_simbench.worker.watching import Watch
 from pytest_simbench.worker.wire import (
     LONGEST_LOGGED,

@@ -18,20 +18,20 @@ from urllib.parse import unquote, urlparse
 import numpy as np
 
 from pytest_simbench.description.shapes import (
-    box_reach,
-    cylinder_reach,
+    Outline,
+    a_box,
+    a_cylinder,
+    a_mesh,
+    a_round,
     mesh_points,
-    placed,
-    reach,
-    round_reach,
 )
 from pytest_simbench.description.urdf import pose_of_rpy
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import Coupling, FloatArray, Pose
 
-from .bindings import bindings
 from .sdf import robot_model
+from .server import bindings
 
 EVERYTHING = 0xFFFF
 """SDF's default of `collide_bitmask`."""
@@ -89,12 +89,11 @@ class ReadBack(readback.ReadBack):
     def pose(self, part: Part) -> FloatArray:
         return pose(part.link.world_pose(self.server.ecm)).as_array()
 
-    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
+    def shapes(self, part: Part) -> Iterator[Outline]:
         for collision in part.element.findall("collision"):
             solid = collision.find("geometry/*")
             assert solid is not None
-            kind = {"box": "boxes", "mesh": "meshes"}.get(solid.tag, "rounds")
-            yield kind, _reach(solid, pose_in(collision))
+            yield _outline(solid, pose_in(collision))
 
     def inertial(self, part: Part) -> dict[str, Any]:
         frame = pose(part.link.world_pose(self.server.ecm))
@@ -187,16 +186,16 @@ class ReadBack(readback.ReadBack):
         return [x & y for x, y in product(*masks)]
 
 
-def _reach(solid: ET.Element, at: Pose) -> FloatArray:
-    """The reach of a shape of SDF at a pose."""
+def _outline(solid: ET.Element, at: Pose) -> Outline:
+    """Of a shape of SDF at a pose."""
     if solid.tag == "box":
         size = solid.find("size")
         assert size is not None
-        return box_reach(numbers(size), at)
+        return a_box(numbers(size), at)
     if solid.tag == "mesh":
-        return reach(placed(_points(solid), at))
+        return a_mesh(_points(solid), at)
     radius, length = (number(solid, what, 0.0) for what in ("radius", "length"))
-    return (cylinder_reach if solid.tag == "cylinder" else round_reach)(radius, length, at)
+    return (a_cylinder if solid.tag == "cylinder" else a_round)(radius, length, at)
 
 
 def _points(mesh: ET.Element) -> FloatArray:

@@ -16,7 +16,7 @@ from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
 
 from ..mujoco.constraints import collide
-from ..mujoco.own_file import OwnFile, Told, compared, deviations, pairs
+from ..mujoco.own_file import FILE_MOVES, OwnFile, Told, compared, deviations, pairs
 from .engine import array_of, contact_parameters, numbers, of_collider
 from .readback import ReadBack
 
@@ -119,6 +119,10 @@ class GenesisFile:
         driven = np.flatnonzero(array_of(self.solver.dyn_info.dofs.act_bias)[:, 1]).tolist()
         if driven:  # which pull to nothing before they are told a target: 0, as in MuJoCo
             self.solver.control_dofs_position(np.zeros(len(driven)), driven)
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        """Raises `NotSupportedError`: the file's own actuators move its joints."""
+        raise NotSupportedError(FILE_MOVES)
 
     def body_state(self) -> FloatArray:
         """As `Simulator.body_state`."""

@@ -59,6 +59,14 @@ def of_file(info: SimulatorInfo, deviations: Iterable[Deviation] = ()) -> Simula
     return replace(info, capabilities=able, deviations=(*info.deviations, *deviations))
 
 
+def loaded(simulator: Any, own: Any, methods: str = "contact_forces numbers") -> None:
+    """Have an adapter's instance tell and command what its file's world has: with these methods of
+    `own` for its own ones, and facts of this world alone."""
+    vars(simulator)["info"] = of_file(type(simulator).info, own.deviations())
+    for name in ("command", "body_state", "joint_state", *methods.split()):
+        vars(simulator)[name] = getattr(own, name)
+
+
 class OwnFile:
     """The model of a scene's file, with the scene's bodies at their places.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.links import link_poses
-from pytest_simbench.description.shapes import DIRECTIONS, box_corners, reach
+from pytest_simbench.description.shapes import DIRECTIONS, Outline, a_box
 from pytest_simbench.description.urdf import Link
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.quantities import kind_of
@@ -101,7 +101,7 @@ class ReadBack(readback.ReadBack):
     def pose(self, part: Part) -> FloatArray:
         return part.pose.as_array()
 
-    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
+    def shapes(self, part: Part) -> Iterator[Outline]:
         path, made, pose = part.path, part.made, part.pose
         if isinstance(made, Link):
             place = self.places.get(made.name, pose)
@@ -110,7 +110,7 @@ class ReadBack(readback.ReadBack):
                 yield "meshes" if shape.size is None else "boxes", reached
         elif isinstance(made, Box) and part.count:  # rays tell the size of a box more exactly
             size = self.session.size(f"{path}/{usd.shape_name(0)}", pose)
-            yield "boxes", reach(box_corners(size))
+            yield a_box(size, Pose())
         else:
             for k, solid in enumerate(made.parts[: part.count]):
                 reached = self.session.reach(f"{path}/{usd.shape_name(k)}", pose, solid.pose)

@@ -24,8 +24,7 @@ from pytest_simbench.testing.kit import (
     reason_for,
     unmatched,
 )
-from pytest_simbench.testing.scenes import at_random, lifted
-from pytest_simbench.testing.touch import approaches, beside, link_clouds
+from pytest_simbench.testing.scenes import approaches, at_random, beside, lifted, link_clouds
 
 LAWS = ("free_fall", "static_hold", "grip_holds", "fingers_stay_coupled")
 KIT = Kit((Subject(MuJoCo),), LAWS, {})
