@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.urdf import Link
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
 
@@ -215,25 +216,13 @@ class FileReadBack(ReadBack):
     def inertial(self, part: Any) -> dict[str, Any]:
         """Of the link and all that is fixed on it."""
         own, body = self.imported.own, self.imported.pose(part.idx) * part.frame
-        found, parts = super().inertial(part), []
+        whole = Link("")
         for link in (k for k in range(own.model.nbody) if own.root(k) == part.idx):
-            frame = body.inverse() * self.imported.pose(link)
             of = super().inertial(self.imported.links[link])
-            turn = frame.rotation()
-            parts.append(
-                (
-                    float(of["mass"]),
-                    turn @ of["com"] + frame.position,
-                    turn @ of["inertia"] @ turn.T,
-                )
-            )
-        mass = sum(m for m, _, _ in parts)
-        centre = sum(m * at for m, at, _ in parts) / mass
-        tensor = np.zeros((3, 3))
-        for m, at, own_tensor in parts:
-            away = at - centre
-            tensor += own_tensor + m * (away @ away * np.eye(3) - np.outer(away, away))
-        return found | {"mass": mass, "com": centre, "inertia": tensor}
+            single = Link("", float(of["mass"]), of["com"], of["inertia"])
+            whole.absorb(single, body.inverse() * self.imported.pose(link))
+        found = {"mass": whole.mass, "com": whole.centre, "inertia": whole.inertia}
+        return super().inertial(part) | found
 
     def _velocity(self, link: Any) -> FloatArray:
         row = next(k for k, part in enumerate(self.imported.free) if part.idx == link.idx)

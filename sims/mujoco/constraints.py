@@ -16,8 +16,6 @@ from .account import HELD
 
 if TYPE_CHECKING:
     from .articulated import Tree
-
-if TYPE_CHECKING:
     from .reading import Reading
 
 mujoco = lazy_import("mujoco")
