@@ -54,6 +54,15 @@ def quaternion_of(rotation: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.eigh(k)[1][:, -1])
 
 
+def turn_of_z(direction: FloatArray) -> Quaternion:
+    """Quaternion of the shortest turn from the z axis to a direction."""
+    x, y, z = map(float, direction)
+    if z < -1 + 1e-9:
+        return (0.0, 1.0, 0.0, 0.0)
+    length = math.sqrt(2 + 2 * z)
+    return (length / 2, -y / length, x / length, 0.0)
+
+
 def quaternion_product(a: Sequence[float], b: Sequence[float]) -> Quaternion:
     """Hamilton product of two quaternions w, x, y, z: first rotate by `b`, then by `a`."""
     aw, ax, ay, az = a

@@ -18,6 +18,7 @@ from pytest_simbench.laws.hands import with_joint as with_joint
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import STANDARD_GRAVITY, Box, FloatArray, Pose, Robot, Scene, Vector3
+from pytest_simbench.scene.pose import turn_of_z
 from pytest_simbench.simulator import PreparedRobot
 
 GRAVITY = -STANDARD_GRAVITY[2]
@@ -137,7 +138,7 @@ class Approach:
     distance: float = _GAP
 
     def cube(self) -> Box:
-        pose = Pose.from_array([*self.start, *_facing(self.direction)])
+        pose = Pose.from_array([*self.start, *turn_of_z(self.direction)])
         return Box(f"to_{self.link}", (_EDGE,) * 3, pose, MASS)
 
 
@@ -212,12 +213,3 @@ def _clear(cloud: FloatArray, start: FloatArray, direction: FloatArray) -> bool:
     away = (cloud - start) - np.outer(ahead, direction)
     low, high = away.min(axis=0), away.max(axis=0)
     return bool((low > 2 * _EDGE).any() or (high < -2 * _EDGE).any())
-
-
-def _facing(direction: FloatArray) -> tuple[float, float, float, float]:
-    """Quaternion of a shortest turn of the z axis to `direction`."""
-    x, y, z = (float(value) for value in direction)
-    if z < -1 + 1e-9:
-        return (0.0, 1.0, 0.0, 0.0)
-    length = float(np.sqrt(2 + 2 * z))
-    return (length / 2, -y / length, x / length, 0.0)
