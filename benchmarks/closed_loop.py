@@ -21,7 +21,7 @@ from common import ROOT, arguments, case, present, spread
 from pytest_simbench.client.errors import Where
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
-from pytest_simbench.motion.servo import Servo
+from pytest_simbench.motion.kinematics import Servo
 from pytest_simbench.scene import Trajectory
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks import Jitter, Stacking

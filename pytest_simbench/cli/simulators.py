@@ -13,9 +13,8 @@ from pytest_simbench.client import environments
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.report.model.capabilities import columns
 from pytest_simbench.report.terminal.grid import render
-from pytest_simbench.simulator.ranges import in_words, meanings, searched
 from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
-from pytest_simbench.simulator.settings import Settings
+from pytest_simbench.simulator.settings import Settings, in_words, meanings, searched
 
 Missing = Callable[[str], str | None]
 """Why a simulator whose adapter is fine cannot run, with what mends it; None when it can."""

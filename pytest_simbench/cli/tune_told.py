@@ -15,7 +15,7 @@ from pytest_simbench.ground.versions import base_name
 from pytest_simbench.measure.intervals import Interval
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.simulator.profile_file import write_profile
-from pytest_simbench.simulator.ranges import in_words
+from pytest_simbench.simulator.settings import in_words
 from pytest_simbench.tasks.measured import MeasuredTask
 from pytest_simbench.tuning.judging import Judgement, judged
 from pytest_simbench.tuning.search import front

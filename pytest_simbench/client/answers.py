@@ -26,7 +26,6 @@ class Constructed:
     """A simulator that a worker made.
 
     Attributes:
-        settings: all of them, by name.
         versions: of the packages that it runs on, by name.
         untested: why this is no version that the adapter was tested with; empty if it is one.
     """

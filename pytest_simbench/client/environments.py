@@ -64,7 +64,6 @@ class Environment:
     """The environment of one simulator, whether it exists or not.
 
     Attributes:
-        info: of the simulator.
         folder: of this environment.
     """
 

@@ -32,8 +32,6 @@ class WorkerError(Exception):
 
     Attributes:
         what: what happened, without the place.
-        where: simulator, mode, repetition, seed, phase.
-        log_tail: the last lines of the worker's log.
     """
 
     def __init__(self, what: str, where: Where, log_tail: str = "") -> None:

@@ -154,7 +154,6 @@ class _Page(HTMLParser):
 
     Attributes:
         files: how many there are.
-        versions: of those that can be installed here.
     """
 
     def __init__(self) -> None:

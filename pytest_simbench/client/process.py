@@ -56,7 +56,6 @@ class WorkerProcess:
     """One worker, from its start to its end. No method waits longer than the limits say.
 
     Args:
-        launch: how to start it.
         where: kept up to date by the owner; every error carries it.
         deadline: see below; counts while starting, too.
         made: told of this object before the start, so that another thread may `interrupt` it.
@@ -220,9 +219,7 @@ class WorkerProcess:
         """Have the worker make its simulator; one that it made before is closed.
 
         Args:
-            profile: of the adapter's settings.
             changes: single settings that differ from the profile, by name.
-            gui: with a window.
             real_time: whether stepping keeps step with the wall clock.
             adapter: `module:Class`; default: the one that the worker was launched for.
             timeout: for the whole request [s]; None: silence ends it after `stall_timeout`.

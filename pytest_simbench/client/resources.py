@@ -62,7 +62,6 @@ class ResourceUse:
     """What a process tree used.
 
     Attributes:
-        samples: in the order of time.
         peak_mb: largest resident memory [MB]: the exact one where the worker reported it,
             or the largest sample of the tree where that is larger; None without both.
     """
@@ -153,7 +152,6 @@ class ResourceSampler:
     serves all samplers of this process.
 
     Args:
-        pid: the worker's.
         interval: between two samples [s]; the study's 10 Hz.
         limit_mb: memory the tree may use [MB], or None.
         on_limit: called once, in a thread of its own, with the RSS [MB], when it uses more.

@@ -44,11 +44,7 @@ print(json.dumps({"python": sys.version_info[:3], "version": version, "absent": 
 
 @dataclass(frozen=True)
 class SystemPython:
-    """The system's Python as the home of one simulator, whether it can be that or not.
-
-    Attributes:
-        info: of the simulator.
-    """
+    """The system's Python as the home of one simulator, whether it can be that or not."""
 
     info: SimulatorInfo
     python: ClassVar[Path] = Path("/usr/bin/python3")

@@ -11,7 +11,7 @@ from typing import Any
 from pytest_simbench.ground.text import for_markdown
 from pytest_simbench.records import lines
 from pytest_simbench.records.paths import write_whole
-from pytest_simbench.scene.wire import Wire
+from pytest_simbench.scene.checks import Wire
 
 CARRIED, APPROXIMATED, NOT_CARRIED = STATES = ("carried", "approximated", "not carried")
 """The scene holds it as the file has it; nearly so; not at all."""

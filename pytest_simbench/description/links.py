@@ -126,7 +126,6 @@ def borne(
     centres of mass by name, in the world, (3,) each [N].
 
     Args:
-        prepared: whose links they are.
         gravity: of the scene [m/s^2].
         felt: share that the engine lets these links feel.
     """

@@ -1,4 +1,5 @@
-"""Meshes that a robot description names: files of the robot, not of the system, and meshes."""
+"""Meshes that a robot description names: files of the robot, not of the system, and binary STL, the
+one form in which robots have meshes."""
 
 from __future__ import annotations
 
@@ -6,9 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from pytest_simbench.description.stl import read_stl
 from pytest_simbench.ground.files import FileError, read_file
+from pytest_simbench.scene import FloatArray
 
 LARGEST_MESH = 16 * 2**20
 """[bytes]"""
@@ -24,14 +26,34 @@ THINNEST = 1e-6
 
 PACKAGE = "package://"
 
+HEADER = 84
+"""[bytes]: 80, and the number of triangles (uint32)."""
+
+TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+"""One record a triangle after that."""
+
+
+def read_stl(data: bytes) -> FloatArray:
+    """The corners of the triangles, (n, 3, 3); none where the data are something else."""
+    count = int.from_bytes(data[HEADER - 4 : HEADER], "little")
+    if len(data) != HEADER + count * TRIANGLE.itemsize:
+        return np.empty((0, 3, 3))
+    return np.asarray(np.frombuffer(data, TRIANGLE, count, HEADER)["corners"], dtype=float)
+
+
+def written_stl(corners: ArrayLike, normals: ArrayLike = 0.0) -> bytes:
+    """A file of triangles: their corners, (n, 3, 3), counter-clockwise from outside, and normals,
+    (n, 3)."""
+    triangles = np.zeros(len(np.asarray(corners)), TRIANGLE)
+    triangles["corners"], triangles["normal"] = corners, normals
+    return bytes(HEADER - 4) + np.uint32(len(triangles)).tobytes() + triangles.tobytes()
+
 
 def mesh_path(filename: str, urdf: str, packages: Mapping[str, str]) -> Path:
     """Where a mesh lies that a URDF names: in one of the robot's packages or beside the URDF.
 
     Args:
         filename: `package://NAME/PATH`, or a path from the URDF's folder.
-        urdf: path of the URDF.
-        packages: folder of each package.
 
     Raises:
         FileError: it is none of these, leads out of its folder, also through a link, or is not

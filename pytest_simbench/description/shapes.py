@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_simbench.description.stl import read_stl, written_stl
+from pytest_simbench.description.mesh_check import read_stl, written_stl
 from pytest_simbench.description.urdf import Shape
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import FloatArray, Polytope, Pose
+from pytest_simbench.scene.polytope import MOST
 
 _GRID = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 DIRECTIONS: FloatArray = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
@@ -38,8 +39,12 @@ def reach(points: FloatArray) -> FloatArray:
     return np.asarray((np.atleast_2d(points) @ DIRECTIONS.T).max(axis=0))
 
 
-def round_reach(radius: float, length: float = 0.0, pose: Pose | None = None) -> FloatArray:
-    """The `reach` of a sphere, or of a capsule along the z axis of a pose, (26,) [m].
+Outline = tuple[str, FloatArray]
+"""Of a collision shape its kind, one of `OUTLINES`, and its `reach`."""
+
+
+def a_round(radius: float, length: float = 0.0, pose: Pose | None = None) -> Outline:
+    """A sphere, or a capsule along the z axis of a pose.
 
     Args:
         radius: [m].
@@ -47,32 +52,34 @@ def round_reach(radius: float, length: float = 0.0, pose: Pose | None = None) ->
         pose: of its centre in the frame; by default the frame itself.
     """
     pose = pose or Pose()
-    axis = pose.rotation()[:, 2]
-    along: FloatArray = np.abs(DIRECTIONS @ axis) * length / 2
-    return np.asarray(DIRECTIONS @ np.asarray(pose.position) + along + radius)
+    along: FloatArray = np.abs(DIRECTIONS @ pose.rotation()[:, 2]) * length / 2
+    return "rounds", np.asarray(DIRECTIONS @ np.asarray(pose.position) + along + radius)
 
 
-def cylinder_reach(radius: float, length: float, pose: Pose | None = None) -> FloatArray:
-    """The `reach` of a cylinder along the z axis of a pose; arguments as of `round_reach`."""
-    pose = pose or Pose()
+def a_cylinder(radius: float, length: float, pose: Pose) -> Outline:
+    """A cylinder along the z axis of a pose; arguments as of `a_round`."""
     along = DIRECTIONS @ pose.rotation()[:, 2]
     across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
     reached = np.abs(along) * length / 2 + across * radius
-    return np.asarray(DIRECTIONS @ np.asarray(pose.position) + reached)
+    return "rounds", np.asarray(DIRECTIONS @ np.asarray(pose.position) + reached)
 
 
-def box_reach(size: Sequence[float] | FloatArray, pose: Pose) -> FloatArray:
-    """The `reach` of a box of edge lengths `size` [m] whose centre is at a pose, (26,) [m]."""
-    return reach(placed(box_corners(size), pose))
+def a_box(size: Sequence[float] | FloatArray, pose: Pose) -> Outline:
+    """A box of edge lengths `size` [m] whose centre is at a pose."""
+    return "boxes", reach(placed(box_corners(size), pose))
+
+
+def a_mesh(corners: FloatArray, pose: Pose) -> Outline:
+    """A mesh by its corners in the frame at a pose, (n, 3) [m]."""
+    return "meshes", reach(placed(corners, pose))
 
 
 def outlines(
-    shapes: Iterable[tuple[str, FloatArray]], asked: Sequence[FloatArray] | None = None
+    shapes: Iterable[Outline], asked: Sequence[FloatArray] | None = None
 ) -> dict[str, FloatArray]:
     """The quantities `boxes`, `meshes` and `rounds` of a body or link.
 
     Args:
-        shapes: each by its kind, one of `OUTLINES`, and its `reach`.
         asked: reaches of the same shapes to order them by, from whoever measures them with an error
             that may change the order.
 
@@ -143,3 +150,26 @@ def _read_obj(data: bytes) -> FloatArray:
         return np.array(rows, dtype=float).reshape(-1, 3)
     except ValueError:
         return np.empty((0, 3))
+
+
+def cylinder_hull(radius: float, half: float) -> tuple[FloatArray, float]:
+    """Corners of a cylinder along z of that radius and half length [m], and by how much their hull
+    is smaller at most [m]: of links every engine reads boxes and meshes alone."""
+    angles = np.linspace(0, 2 * np.pi, MOST // 2, endpoint=False)
+    ring = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    ends = [np.hstack([ring, np.full((len(ring), 1), z)]) for z in (-half, half)]
+    return np.concatenate(ends), radius * (1 - float(np.cos(np.pi / len(ring))))
+
+
+def capsule_hull(radius: float, half: float = 0.0) -> tuple[FloatArray, float]:
+    """The same of a capsule, `half` the length between its ends' middles; 0: a sphere."""
+    ways = directions(MOST)
+    gap = radius * (1 - float((directions(400) @ ways.T).max(axis=1).min()))
+    return radius * ways + np.array([0.0, 0.0, half]) * np.sign(ways[:, 2:]), gap
+
+
+def directions(count: int) -> FloatArray:
+    """Unit vectors, spread evenly over all directions (a spiral), (count, 3)."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    angle, flat = np.pi * (3 - np.sqrt(5)) * np.arange(count), np.sqrt(1 - z**2)
+    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], axis=1)

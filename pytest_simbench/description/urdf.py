@@ -20,8 +20,8 @@ import numpy as np
 from pytest_simbench.description.urdf_check import Description
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import Body, ConvexMesh, FloatArray, Polytope, Pose, Robot, Vector3
+from pytest_simbench.scene.checks import Wire
 from pytest_simbench.scene.pose import vector3
-from pytest_simbench.scene.wire import Wire
 
 ROOT = "base"
 """Link of a reduced robot that is fixed in the world."""
@@ -193,7 +193,6 @@ class PreparedRobot:
 
         Args:
             mimic: say that the other fingers follow the first.
-            visuals: draw each collision shape.
         """
         root = ET.Element("robot", name=self.robot.name)
         for link in self.links.values():

@@ -43,9 +43,6 @@ class Description:
         change: is given the root element before anything is checked.
 
     Attributes:
-        path: of the file, for messages.
-        xml: the root element.
-        links: elements by name.
         joints: elements, in the order of the file.
         root: name of the link on which all others hang.
 
@@ -320,8 +317,6 @@ def read_xml(path: str, what: str, lines: dict[ET.Element, int] | None = None) -
     """The root element of an XML file without a document type, which could define entities.
 
     Args:
-        path: of the file.
-        what: the file is, for messages.
         lines: takes the line of each element.
 
     Raises:

@@ -11,12 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_simbench.description import rounded
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
 from pytest_simbench.description.links import link_poses
-from pytest_simbench.description.mesh_check import PACKAGE
+from pytest_simbench.description.mesh_check import PACKAGE, read_stl, written_stl
 from pytest_simbench.description.robot_files import content, keep, keep_mesh
-from pytest_simbench.description.stl import read_stl, written_stl
+from pytest_simbench.description.shapes import capsule_hull, cylinder_hull
 from pytest_simbench.description.urdf import PreparedRobot, Shape
 from pytest_simbench.description.urdf_check import MOVING, Description, read_xml
 from pytest_simbench.ground.errors import DescriptionError
@@ -209,7 +208,7 @@ class _World(Description):
 @cache
 def _round(radius: float, half: float) -> tuple[str, float]:
     """A mesh of a cylinder of that half length, or with none of a sphere [m], and its `gap`."""
-    points, gap = rounded.cylinder(radius, half) if half else rounded.capsule(radius)
+    points, gap = cylinder_hull(radius, half) if half else capsule_hull(radius)
     hull = Polytope(points)
     return str(keep_mesh(written_stl(hull.points[np.array(hull.triangles)]))), gap
 

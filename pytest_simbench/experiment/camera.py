@@ -6,8 +6,7 @@ from collections.abc import Collection
 
 from pytest_simbench.client.answers import Frame
 from pytest_simbench.client.world import World
-from pytest_simbench.recordings.album import SIZE, Album
-from pytest_simbench.recordings.film import PERIOD, Film
+from pytest_simbench.recordings.film import PERIOD, SIZE, Album, Film
 
 
 class Camera:

@@ -10,7 +10,7 @@ from pytest_simbench.experiment.camera import Camera
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem
 from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.recordings import album, film
+from pytest_simbench.recordings import film
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
@@ -35,17 +35,17 @@ def photograph(experiment: Experiment, *, pictures: bool = True, video: bool = F
     if told := draws(case.simulator):
         return told
     stem = file_stem(experiment, 1)
-    names = f"{album.FOLDER}/{stem}.npz", f"{film.FOLDER}/{stem}.mp4"
+    names = f"{film.PICTURES}/{stem}.npz", f"{film.FOLDER}/{stem}.mp4"
     try:
         there = [os.path.lexists(inside(case.folder, name)) for name in names]
     except FolderError as wrong:
         return f"{case.simulator}: no pictures and no videos: {wrong}"
-    taken = album.Album() if pictures and not there[0] else None
+    taken = film.Album() if pictures and not there[0] else None
     filmed = film.Film(case.folder, names[1]) if video and not there[1] else None
     if taken is None and filmed is None:
         return ""
     camera = Camera(taken, filmed, experiment.task.pictured)
-    beside = experiment.in_case(folder=case.folder / album.FOLDER, trace="off", video="first")
+    beside = experiment.in_case(folder=case.folder / film.PICTURES, trace="off", video="first")
     _, error = Repetition(beside, 1, camera=camera).run()
     if error is not None and not isinstance(error, Exception):
         raise error

@@ -365,7 +365,7 @@ class Repetition:
 
 def kinematics(scene: Scene) -> Kinematics:
     """Of a scene's robot; its library is loaded when a policy first asks."""
-    from pytest_simbench.motion.servo import Servo
+    from pytest_simbench.motion.kinematics import Servo
 
     return Servo(scene)
 

@@ -17,7 +17,7 @@ from pytest_simbench.client.closed_loop import ClosedLoop, Looking
 from pytest_simbench.client.errors import Diverged, WorkerError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
-from pytest_simbench.motion.servo import Servo
+from pytest_simbench.motion.kinematics import Servo
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.scene.plausibility import implausible
 from pytest_simbench.scene.policy import Command, Rhythm

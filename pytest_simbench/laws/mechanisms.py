@@ -88,8 +88,6 @@ def mechanism(
     """Parts that hang on each other, and the first on the mount, fixed in the world at `base`.
 
     Args:
-        name: of the robot.
-        parts: parents first.
         base: of the mount; None: 2 m above the origin.
         friction, closures, couplings, self_collide: see `scene.Robot`.
         shape: edges of a box about the mount's origin that collides [m]; None: nothing does.

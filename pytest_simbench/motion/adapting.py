@@ -132,7 +132,6 @@ def mounted(arm: ET.Element, hand: ET.Element, root: str, mount: str, pose: Pose
     """The URDF of an arm with a hand.
 
     Args:
-        arm: URDF of the arm.
         hand: a URDF with the hand in it.
         root: link of `hand` with which the hand begins; what hangs on it is the hand.
         mount: link of `arm` that carries it.

@@ -147,7 +147,6 @@ def choose(
         approach: how far above the pose must be free, too, with the planning scene's margin [m].
         home: arm joints where the search starts, (arm,) [rad].
         arm: present arm joints, (arm,) [rad].
-        rng: draws further starts of the search.
         ignored: bodies that may be touched.
 
     Raises:

@@ -17,8 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from pytest_simbench.description.mesh_check import read_stl, written_stl
 from pytest_simbench.description.robot_files import digest
-from pytest_simbench.description.stl import read_stl, written_stl
 from pytest_simbench.description.urdf import origin_of
 from pytest_simbench.scene import FloatArray
 

@@ -19,8 +19,6 @@ class RobotModel:
     """The robot's model; joint vectors are in the order of `robot.joints`, arm first.
 
     Attributes:
-        robot: as described in the scene.
-        arm: number of arm joints.
         lower, upper: position limits of the arm joints [rad], (arm,).
         effort_limits: of the arm joints [N m], (arm,).
 

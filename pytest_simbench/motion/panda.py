@@ -87,7 +87,6 @@ def panda(*, squeeze: float = SQUEEZE, friction: float = 1.0, base: Pose | None 
 
     Args:
         squeeze: effort limit of each finger [N].
-        friction: of every link's surface.
         base: pose of the base, default the world's origin.
     """
     folder = description_folder()

@@ -23,7 +23,6 @@ class Strain:
     """Largest shares of the arm's limits during a motion; 1 is the limit.
 
     Attributes:
-        velocity, acceleration: of the joints.
         torque: that the real arm's motors would need for the motion as it was executed, by inverse
             dynamics; the simulated drives themselves cannot exceed their limits.
     """

@@ -34,7 +34,6 @@ def straight_move(
 
     Args:
         start, goal: arm joints, (arm,) [rad].
-        limits: of the arm.
         speed: share of the velocity limits; acceleration scales with its square, jerk with its
             cube, which stretches time by 1 / speed.
     """
@@ -82,7 +81,6 @@ def along_path(path: FloatArray, limits: MotionLimits, *, speed: float = 1.0) ->
 
     Args:
         path: way points, (n, arm) [rad], n >= 2.
-        limits: of the arm.
         speed: share of the velocity limits, as in `straight_move`.
     """
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])

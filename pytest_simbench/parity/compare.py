@@ -118,8 +118,6 @@ class Lasting:
     """What may not change while a world is stepped, as it was read when it was loaded.
 
     Args:
-        reported: all that the engine told then.
-        scene: what was loaded.
         simulator: what messages call it.
         deviations: declared ones. A shape that an engine tells with an error (it is measured from
             another side each time) may differ by twice that error between two readings.

@@ -1,16 +1,24 @@
-"""The template of what an adapter reads back: of which parts of a scene its engine is asked."""
+"""The template of what an adapter reads back: of which parts of a scene its engine is asked.
+
+An adapter keeps the scene that it loaded, for names. To see that what it reads back comes from the
+engine, it is made to remember another scene of the same names (`remembering`): what it then reads
+back must still be what the engine holds.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import outlines
+from pytest_simbench.description.shapes import Outline, outlines
+from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.parity.quantities import named, touches
-from pytest_simbench.scene import Coupling, FloatArray
+from pytest_simbench.scene import Body, Coupling, FloatArray, Robot, Scene
+from pytest_simbench.simulator.base import Simulator
 
 
 class ReadBack(ABC):
@@ -76,8 +84,8 @@ class ReadBack(ABC):
         """Of the frame of a body or link, (7,)."""
 
     @abstractmethod
-    def shapes(self, part: Any) -> Iterable[tuple[str, FloatArray]]:
-        """Of a body or link, each by its kind and its reach, see `shapes.outlines`."""
+    def shapes(self, part: Any) -> Iterable[Outline]:
+        """Of a body or link."""
 
     def asked(self, part: Any) -> list[FloatArray] | None:
         """The reaches that the scene asks for, of an engine whose shapes are measured; None: as
@@ -151,3 +159,52 @@ def one_value(values: Any) -> Any:
     """
     different = np.unique(values)
     return different[0] if len(different) == 1 else different
+
+
+@contextmanager
+def remembering(simulator: Simulator, scene: Scene) -> Iterator[None]:
+    """Have the adapter, and the objects of its own package that it holds, remember `scene`.
+
+    Every `Scene`, `Robot`, `PreparedRobot` and `Body` among their attributes is replaced meanwhile.
+    """
+    replaced = list(_memories(simulator, scene))
+    for owner, name, _, other in replaced:
+        object.__setattr__(owner, name, other)
+    try:
+        yield
+    finally:
+        for owner, name, value, _ in replaced:
+            object.__setattr__(owner, name, value)
+
+
+def _memories(simulator: Simulator, scene: Scene) -> Iterator[tuple[Any, str, Any, Any]]:
+    """Owner, attribute, value and its counterpart in `scene` of everything remembered."""
+    packages = {cls.__module__.partition(".")[0] for cls in type(simulator).__mro__} - {"builtins"}
+    waiting: list[Any] = [simulator]
+    seen = set()
+    while waiting:
+        owner = waiting.pop()
+        if id(owner) in seen:
+            continue
+        seen.add(id(owner))
+        for name, value in vars(owner).items():
+            other = _counterpart(value, scene)
+            if other is not None:
+                yield owner, name, value, other
+            elif type(value).__module__.partition(".")[0] in packages and hasattr(
+                value, "__dict__"
+            ):
+                waiting.append(value)
+
+
+def _counterpart(value: Any, scene: Scene) -> Any:
+    robot = scene.robot
+    if isinstance(value, Scene):
+        return scene
+    if isinstance(value, Body):
+        return scene.body(value.name)
+    if isinstance(value, Robot):
+        return robot
+    if isinstance(value, PreparedRobot) and robot is not None:
+        return PreparedRobot(robot)
+    return None

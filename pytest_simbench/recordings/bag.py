@@ -60,7 +60,6 @@ def write_bag(trace: Trace, folder: Path, told: dict[str, str] | None = None) ->
     """Write a trace as a bag of its own; one that was there is replaced.
 
     Args:
-        trace: of a repetition.
         folder: of the bag; the one above it is there, and no link.
         told: texts for the bag's metadata (`custom_data`), by name.
 

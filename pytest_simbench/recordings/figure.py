@@ -14,10 +14,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.description.stl import read_stl
+from pytest_simbench.description.mesh_check import read_stl
 from pytest_simbench.description.urdf import MovingJoint, PreparedRobot
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
-from pytest_simbench.scene.wire import Wire
+from pytest_simbench.scene.checks import Wire
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +56,8 @@ class Figure(Wire):
     """A robot to be drawn.
 
     Attributes:
-        name: of the robot.
         root: the link that is fixed in the world, its frame the world's.
         hinges: the moving joints, parents first; their axes are unit vectors.
-        parts: shapes of all links.
-        meshes: that the parts name.
         urdf: the reduced robot as text, without its meshes: their paths do not travel.
     """
 

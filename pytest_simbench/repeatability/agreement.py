@@ -46,7 +46,6 @@ class Facts:
         label: simulator, with mode and profile where a reader needs them.
         task, seed: what was run; only equal ones are compared.
         bodies: names of the free bodies.
-        counts: of the outcome.
     """
 
     label: str
@@ -147,7 +146,6 @@ class Parting:
 
     Attributes:
         time: simulated, in the first one [s].
-        body: the cube.
         position: of the cube in the first one [m].
     """
 

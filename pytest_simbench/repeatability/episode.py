@@ -23,9 +23,7 @@ class Episode:
     """What one run of a task gave.
 
     Attributes:
-        outcome: the task's score.
         counts: those of its metrics that count things: what "the outcome" means here.
-        tape: the operations that were carried out.
         motions: their samples, see `TapedWorld.motions`.
         bodies: names of the free bodies.
         left_at: when the task asked for something else than the tape that was played [s].
@@ -71,10 +69,8 @@ class Episodes:
         """Run it once.
 
         Args:
-            perturbations: of scene and controller.
             play: commands to be sent in place of those that the task plans.
             before: called before each operation.
-            handle: another worker to run in.
 
         Raises:
             WorkerError: whatever happened to the worker.

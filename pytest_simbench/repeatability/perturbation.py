@@ -29,7 +29,6 @@ class Quantity:
         shown: factor from there to `unit`.
         unit: in which it is told.
         phrase: how it is told, after the number.
-        signed: whether it can be negative.
     """
 
     name: str

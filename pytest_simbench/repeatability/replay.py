@@ -40,10 +40,8 @@ class Replay:
     """All ways of running one seed again in one simulator.
 
     Attributes:
-        simulator: its name.
         claims: whether its adapter claims that it is deterministic.
         first: the run that the others are compared with.
-        again: the ways, with their results.
     """
 
     simulator: str
@@ -89,7 +87,6 @@ def replay(
 
     Args:
         episodes: its handle should not have been used before.
-        capabilities: that the adapter claims.
         fresh: a handle of the same case, for a process of its own.
         other_mode: a handle in the other mode (with a window, when the first has none), or why
             there is none.

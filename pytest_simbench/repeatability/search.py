@@ -154,9 +154,7 @@ class Finding:
     """What a search came to.
 
     Attributes:
-        simulator: its name.
         smallest: the smallest perturbation found that changes the outcome; None: none was found.
-        effect: what it does, in words.
         examples: runs until the first such perturbation, 0 when none was found.
         runs: runs altogether, shrinking included.
         confirmed: whether perturbed and unperturbed run, both made anew, gave the same again.
@@ -232,7 +230,6 @@ def search(
     once.
 
     Args:
-        episodes: to be perturbed.
         bounds: largest changes by quantity, see `perturbation.perturbations`.
         examples: runs of the simulator until it gives up.
         shrinks: further runs to make smaller what it found.

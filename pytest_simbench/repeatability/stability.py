@@ -33,9 +33,7 @@ class Stability:
     """What random perturbations up to a bound left of a task.
 
     Attributes:
-        simulator: its name.
         kept: for each run, the share that was left of the outcome's counts, the worst of them.
-        unchanged: how many runs gave the same outcome.
         bounds: largest changes, in words.
         worst: the perturbation that left least, and what it did, in words; "" when all was kept.
         strict: whether a claim that is not decided fails (`--sim-strict`).
@@ -103,10 +101,7 @@ def stability(
     a uniform draw would bring them.
 
     Args:
-        episodes: to be perturbed.
         bounds: largest changes by quantity, see `perturbation.perturbations`.
-        examples: how many runs, each with another perturbation.
-        at_most: how many perturbations at once.
         random_seed: of Hypothesis.
 
     Raises:
@@ -141,7 +136,6 @@ class Sensitivity:
     """How far apart the cubes are after a small displacement, per unit of it.
 
     Attributes:
-        simulator: its name.
         perturbation: the displacement, in words.
         ratio: by seconds after the task began, that is after its first motion began, or the world
             where nothing moves by itself: largest distance between a cube with and without the
@@ -169,7 +163,6 @@ class Sensitivity:
         """Raise AssertionError when the ratio exceeds `most` before a time or a moment.
 
         Args:
-            most: the largest ratio allowed.
             until: seconds after the task began, or the name of one of the moments.
 
         Raises:
@@ -205,7 +198,6 @@ def sensitivity(
     The commands are those of the unperturbed run, so what grows is the simulator's own.
 
     Args:
-        episodes: to be perturbed.
         perturbation: in x or y.
         moments: until which the growth is told; by default those that the task declares.
 

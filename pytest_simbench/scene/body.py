@@ -13,6 +13,7 @@ import numpy as np
 from pytest_simbench.scene.checks import (
     LARGEST,
     SceneError,
+    Wire,
     check_name,
     check_number,
     check_numbers,
@@ -20,7 +21,6 @@ from pytest_simbench.scene.checks import (
 )
 from pytest_simbench.scene.overlap import Core
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
-from pytest_simbench.scene.wire import Wire
 
 ZERO: Vector3 = (0.0, 0.0, 0.0)
 

@@ -6,9 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from pytest_simbench.scene.bodies import Box, ConvexMesh
+from pytest_simbench.scene.bodies import Box, Compound, ConvexMesh
 from pytest_simbench.scene.body import Body
-from pytest_simbench.scene.compound import Compound
 from pytest_simbench.scene.overlap import distance, overlaps, parted
 from pytest_simbench.scene.pose import FloatArray
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.scene.wire import Wire
+from pytest_simbench.scene.checks import Wire
 
 FloatArray = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
@@ -52,6 +52,15 @@ def quaternion_of(rotation: FloatArray) -> FloatArray:
         ]
     )
     return np.asarray(np.linalg.eigh(k)[1][:, -1])
+
+
+def turn_of_z(direction: FloatArray) -> Quaternion:
+    """Quaternion of the shortest turn from the z axis to a direction."""
+    x, y, z = map(float, direction)
+    if z < -1 + 1e-9:
+        return (0.0, 1.0, 0.0, 0.0)
+    length = math.sqrt(2 + 2 * z)
+    return (length / 2, -y / length, x / length, 0.0)
 
 
 def quaternion_product(a: Sequence[float], b: Sequence[float]) -> Quaternion:

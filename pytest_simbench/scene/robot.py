@@ -10,13 +10,13 @@ import numpy as np
 from pytest_simbench.scene.checks import (
     STIFFEST,
     SceneError,
+    Wire,
     check_name,
     check_number,
     check_numbers,
     check_pose,
 )
 from pytest_simbench.scene.pose import FloatArray, Pose, Vector3
-from pytest_simbench.scene.wire import Wire
 
 WIDEST = 6.0
 """Limits of a hinge without any [rad]: less than a turn to each side, which every engine holds."""

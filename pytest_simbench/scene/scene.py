@@ -10,6 +10,7 @@ from pytest_simbench.scene.body import Body
 from pytest_simbench.scene.checks import (
     RESERVED,
     SceneError,
+    Wire,
     check_name,
     check_number,
     check_numbers,
@@ -18,7 +19,6 @@ from pytest_simbench.scene.friction import RULES
 from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.scene.pose import Pose, Vector3
 from pytest_simbench.scene.robot import Robot
-from pytest_simbench.scene.wire import Wire
 
 STANDARD_GRAVITY: Vector3 = (0.0, 0.0, -9.80665)
 """Standard acceleration of free fall [m/s^2] (ISO 80000-3)."""

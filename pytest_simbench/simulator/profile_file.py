@@ -33,11 +33,8 @@ class ProfileFile:
     """A profile that a file holds, checked.
 
     Attributes:
-        path: as it was given.
         simulator: whose settings they are, without a version.
         base: the adapter's profile that it begins with.
-        changes: the settings that differ from that.
-        chosen_on: seeds by whose results they were chosen.
     """
 
     path: str

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from pytest_simbench.testing import (  # noqa: F401  they register their checks
     acting,
-    compounds,
     contract,
     drives,
     dynamics,
@@ -24,8 +23,13 @@ from pytest_simbench.testing import (  # noqa: F401  they register their checks
     physics,
     state,
 )
-from pytest_simbench.testing.checks import CHECKS, Check
-from pytest_simbench.testing.kit import ConformanceTest, ConformanceWarning, conformance_checks
+from pytest_simbench.testing.kit import (
+    CHECKS,
+    Check,
+    ConformanceTest,
+    ConformanceWarning,
+    conformance_checks,
+)
 from pytest_simbench.testing.subject import ConformanceFailure, Subject, close_workers
 
 __all__ = [

@@ -21,7 +21,7 @@ from pytest_simbench.scene import Trajectory
 from pytest_simbench.simulator import Capability, Settings
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import any_robot, check
+from pytest_simbench.testing.kit import any_robot, check
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
 
 SINGLE = 1e-5

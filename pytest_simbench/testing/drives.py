@@ -8,7 +8,7 @@ from pytest_simbench.laws.hands import close_command, gravity_effort
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import any_robot, check, coupled, grasping
+from pytest_simbench.testing.kit import any_robot, check, coupled, grasping
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
 
 ARM_TICK = 0.004

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.mesh_check import written_stl
 from pytest_simbench.description.robot_files import content_of, digest, folder, keep
 from pytest_simbench.description.shapes import mesh_points
-from pytest_simbench.description.stl import written_stl
 from pytest_simbench.laws.mechanisms import Part, Y, mechanism
 from pytest_simbench.scene import (
     Box,
@@ -45,9 +45,7 @@ class Fault:
     """One way in which a world may be built wrong.
 
     Attributes:
-        what: in plain words.
         quantity: that must be found to differ.
-        plant: makes the faulty scene.
         needs: the capability without which an engine cannot be wrong in this way.
         word: of `Deviation.only`, by which an adapter declares that its engine has no such thing.
     """

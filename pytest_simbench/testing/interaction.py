@@ -16,10 +16,9 @@ from pytest_simbench.scene import FloatArray, Pose, Scene, Wrench
 from pytest_simbench.tasks.manipulator import Manipulator
 from pytest_simbench.tasks.throw_analysis import Thrown
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import any_robot, check, grasping, throwing
-from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS
+from pytest_simbench.testing.kit import any_robot, check, grasping, throwing
+from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS, Approach, approaches, beside
 from pytest_simbench.testing.subject import Subject, asked, logged, require, require_close
-from pytest_simbench.testing.touch import Approach, approaches, beside
 
 _GRASP = 0.5
 """For how long the hand closes before anything is asked [s]."""

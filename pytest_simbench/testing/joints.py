@@ -24,7 +24,7 @@ from pytest_simbench.scene import (
 from pytest_simbench.scene.pose import vector3
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.kit import check
 from pytest_simbench.testing.scenes import GRAVITY as G
 from pytest_simbench.testing.subject import Subject, logged, require, require_close
 

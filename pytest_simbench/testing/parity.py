@@ -12,7 +12,6 @@ from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import any_robot, check
 from pytest_simbench.testing.contract import SINGLE
 from pytest_simbench.testing.faults import (
     FAULTS,
@@ -22,6 +21,7 @@ from pytest_simbench.testing.faults import (
     rounds,
     true_scene,
 )
+from pytest_simbench.testing.kit import any_robot, check
 from pytest_simbench.testing.state import require_same, swung
 from pytest_simbench.testing.subject import Subject, require
 

@@ -35,7 +35,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import check
+from pytest_simbench.testing.kit import check
 from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS, of_scene
 from pytest_simbench.testing.subject import Subject, asked, logged, require, require_close
 

@@ -13,7 +13,7 @@ from pytest_simbench.laws.hands import close_command
 from pytest_simbench.scene import Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.checks import any_robot, check, grasping
+from pytest_simbench.testing.kit import any_robot, check, grasping
 from pytest_simbench.testing.subject import Subject, logged, require
 
 

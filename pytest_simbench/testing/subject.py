@@ -64,7 +64,6 @@ class Subject:
 
     Attributes:
         cls: the adapter's class.
-        profile: name of its settings profile.
         python: interpreter of its worker; None for that of its own environment where it has one
             (`simbench install`), else this one.
         robot: that the laws are asked with; None: the Panda.

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.ground.names import file_name
-from pytest_simbench.simulator.ranges import Linear, Log, Searched, changes, searched
-from pytest_simbench.simulator.settings import Settings
+from pytest_simbench.simulator.settings import Linear, Log, Searched, Settings, changes, searched
 from pytest_simbench.tuning.judging import recommended
 from pytest_simbench.tuning.steps import TRIES, acts, between, corners, near, own_values
 from pytest_simbench.tuning.target import FAILED, TuningError

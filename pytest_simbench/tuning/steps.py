@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.simulator.ranges import Linear, Log, Searched
-from pytest_simbench.simulator.settings import Settings
+from pytest_simbench.simulator.settings import Linear, Log, Searched, Settings
 
 TRIES = 50
 """Draws of values for which a new or better one is looked for."""

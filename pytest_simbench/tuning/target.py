@@ -13,7 +13,7 @@ from pytest_simbench.data import impacts, pushes, tosses
 from pytest_simbench.data.sets import read
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.laws import LAWS, Law
-from pytest_simbench.laws.held_out import held_out
+from pytest_simbench.laws.base import held_out
 from pytest_simbench.measure.verdicts import Bound
 from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.records.phenomena import PHENOMENA

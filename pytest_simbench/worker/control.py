@@ -92,7 +92,6 @@ class Control:
         runs: of the workload, after two that only warm it up.
         wall: seconds of all runs.
         waited: how much of that the thread waited for a processor.
-        cpu: CPU seconds of the thread in them.
     """
 
     def __init__(self, clock: Clock) -> None:

@@ -40,10 +40,8 @@ class Loop:
         late: time steps from an answer to when it begins to act.
         told: the set points in force at the start.
         period: [s].
-        answer: the policy.
 
     Attributes:
-        steps: that there are at most.
         told: the set points in force.
     """
 
@@ -87,7 +85,6 @@ def outside(
 
     Args:
         exchange: sends a question and waits for its answer.
-        looks: what else there is to see.
     """
 
     def answer(
@@ -112,7 +109,6 @@ def inside(scene: Scene, told: Row, period: float, policy: Mapping[str, Any]) ->
     """A policy that runs here.
 
     Args:
-        scene: with a robot.
         told: the set points in force.
         period: of the policy [s].
         policy: `path` and `source` of its module, `name` of the class or function in it, `state`:

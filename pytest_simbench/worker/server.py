@@ -26,8 +26,8 @@ from pytest_simbench import __version__
 from pytest_simbench.description.links import check_names
 from pytest_simbench.description.robot_files import received
 from pytest_simbench.parity.compare import check
-from pytest_simbench.parity.memory import remembering
 from pytest_simbench.parity.quantities import expected_quantities
+from pytest_simbench.parity.readback import remembering
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
@@ -37,7 +37,6 @@ from pytest_simbench.simulator.info import (
     importable,
 )
 from pytest_simbench.simulator.settings import changed
-from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.loop import Loop, told_forces
 from pytest_simbench.worker.loop import inside as run_inside
 from pytest_simbench.worker.loop import outside as run_outside
@@ -47,7 +46,7 @@ from pytest_simbench.worker.state import (
     checked_quantities,
     checked_state,
 )
-from pytest_simbench.worker.stepping import Stepper
+from pytest_simbench.worker.stepping import Acting, Stepper
 from pytest_simbench.worker.watching import Watch
 from pytest_simbench.worker.wire import (
     LONGEST_LOGGED,

@@ -45,12 +45,7 @@ ALIKE = 0.02
 
 @dataclass(frozen=True)
 class States:
-    """Reads a simulator's clock and states, and lets nothing pass that is none.
-
-    Attributes:
-        simulator: a loaded one.
-        scene: what it loaded.
-    """
+    """Reads a simulator's clock and states, and lets nothing pass that is none."""
 
     simulator: Simulator
     scene: Scene

@@ -1,7 +1,9 @@
-"""The stepping loop: everything that happens between two messages, natively in the worker."""
+"""The stepping loop: everything that happens between two messages, natively in the worker; and what
+moves a scene's bodies from outside: forces for a time, and motions that are prescribed."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -9,13 +11,87 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.scene import FloatArray, Scene, Trajectory
+from pytest_simbench.scene import Body, FloatArray, Pose, Scene, Trajectory
 from pytest_simbench.simulator import DivergedError, Simulator
-from pytest_simbench.worker.acting import Acting
 from pytest_simbench.worker.control import Clock, Control, Family
 from pytest_simbench.worker.loop import Loop, Row
 from pytest_simbench.worker.state import States
 from pytest_simbench.worker.watching import Watch
+
+
+class Acting:
+    """Tells a simulator before each step what acts on the bodies of its loaded scene in that step.
+
+    Raises:
+        NotSupportedError: the scene has forces or prescribed bodies, and the simulator takes none.
+    """
+
+    def __init__(self, simulator: Simulator, scene: Scene) -> None:
+        self.simulator = simulator
+        self._wrenches = [body.wrenches for body in scene.free_bodies]
+        self._pushes = any(self._wrenches)
+        self._led = scene.prescribed_bodies
+        self._acts = True
+        # Who takes neither says so now. Without force: engines add up what acts before a step.
+        if self._pushes:
+            simulator.push(np.zeros((len(self._wrenches), 6)))
+        self._lead(0.0)
+
+    @classmethod
+    def of(cls, simulator: Simulator, scene: Scene) -> Acting | None:
+        """None where nothing acts from outside."""
+        return cls(simulator, scene) if scene.words & {"wrench", "prescribed"} else None
+
+    def steps(self) -> Callable[[], None]:
+        """What to call before each of the coming steps."""
+        count = round(self.simulator.time / self.simulator.settings.timestep) - 1
+        self._acts = True  # a restored world may have forces of another time
+
+        def act() -> None:
+            nonlocal count
+            count += 1
+            self._act(count)
+
+        return act
+
+    def _act(self, step: int) -> None:
+        timestep = self.simulator.settings.timestep
+        begin, end = step * timestep, (step + 1) * timestep
+        if self._pushes:
+            rows = self.wrenches(begin, end)
+            acts = bool(rows.any())
+            if acts or self._acts:
+                self.simulator.push(rows)
+            self._acts = acts
+        self._lead(begin)
+
+    def _lead(self, begin: float) -> None:
+        if self._led:
+            end = begin + self.simulator.settings.timestep
+            self.simulator.lead(
+                np.array([prescribed(body, begin) for body in self._led]),
+                np.array([prescribed(body, end) for body in self._led]),
+            )
+
+    def wrenches(self, begin: float, end: float) -> FloatArray:
+        """Mean force and torque on each free body between two times [s], (n_free, 6)."""
+        rows = np.zeros((len(self._wrenches), 6))
+        for row, wrenches in zip(rows, self._wrenches, strict=True):
+            for wrench in wrenches:
+                row += wrench.mean(begin, end)
+        return rows
+
+
+def prescribed(body: Body, time: float) -> FloatArray:
+    """State of a body that moves with constant velocities, as a row of body states, (13,)."""
+    place = np.asarray(body.pose.position) + time * np.asarray(body.linear_velocity)
+    speed = math.hypot(*body.angular_velocity)
+    half = speed * time / 2
+    axis = np.asarray(body.angular_velocity) / speed if speed else np.zeros(3)
+    x, y, z = (float(value) for value in math.sin(half) * axis)
+    turned = Pose(quaternion=(math.cos(half), x, y, z)) * Pose(quaternion=body.pose.quaternion)
+    return np.array([*place, *turned.quaternion, *body.velocity])
+
 
 HEARTBEAT_PERIOD = 0.5
 """Wall time between two signs of life while stepping [s]."""
@@ -58,7 +134,6 @@ class Stepper:
     """Steps one simulator through trajectories and waits, and keeps its clocks.
 
     Attributes:
-        states: reads the simulator's clock and states.
         acting: what moves bodies from outside; None: nothing.
         film: every how many steps since loading a picture is due, and what takes one, outside of
             the measured stepping time; None: no pictures.

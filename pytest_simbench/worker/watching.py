@@ -67,8 +67,6 @@ class Watch:
     """Watches one simulator from loading to the end of its repetition.
 
     Args:
-        simulator: a loaded one.
-        scene: what it loaded.
         expected: the scene's quantities (`parity.quantities`).
         reported: what the engine told of them.
         seed: of the repetition; draws the steps.

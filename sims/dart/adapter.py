@@ -36,8 +36,7 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
-from .bodies import ONE_CONTACT_ON_A_PLANE, add_body, add_ground, set_surface
-from .couplings import Couplings
+from .bodies import ONE_CONTACT_ON_A_PLANE, Couplings, add_body, add_ground, set_surface
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, DARTSettings
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import DIRECTIONS, box_reach, cylinder_reach, round_reach
+from pytest_simbench.description.shapes import DIRECTIONS, Outline, a_box, a_cylinder, a_round
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import felt, one_value
 from pytest_simbench.scene import Coupling, FloatArray, Pose
@@ -54,19 +54,19 @@ class ReadBack(readback.ReadBack):
         place = part.getWorldTransform()
         return np.concatenate([place.translation(), place.quaternion().wxyz()])
 
-    def shapes(self, part: Any) -> Iterator[tuple[str, FloatArray]]:
+    def shapes(self, part: Any) -> Iterator[Outline]:
         kinds, place = dartpy.dynamics, part.getWorldTransform()
         for shape in _colliding(part):
             own, solid = place.inverse().multiply(shape.getWorldTransform()), shape.getShape()
             pose = Pose.from_array([*own.translation(), *own.quaternion().wxyz()])
             if isinstance(solid, kinds.BoxShape):
-                yield "boxes", box_reach(solid.getSize(), pose)
+                yield a_box(solid.getSize(), pose)
             elif isinstance(solid, kinds.SphereShape):
-                yield "rounds", round_reach(solid.getRadius(), 0.0, pose)
+                yield a_round(solid.getRadius(), 0.0, pose)
             elif isinstance(solid, kinds.CapsuleShape):
-                yield "rounds", round_reach(solid.getRadius(), solid.getHeight(), pose)
+                yield a_round(solid.getRadius(), solid.getHeight(), pose)
             elif isinstance(solid, kinds.CylinderShape):
-                yield "rounds", cylinder_reach(solid.getRadius(), solid.getHeight(), pose)
+                yield a_cylinder(solid.getRadius(), solid.getHeight(), pose)
             else:
                 yield "meshes", self._measured(shape, place)
 

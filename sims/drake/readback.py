@@ -8,14 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import (
-    OUTLINES,
-    box_reach,
-    cylinder_reach,
-    placed,
-    reach,
-    round_reach,
-)
+from pytest_simbench.description.shapes import OUTLINES, Outline, a_box, a_cylinder, a_mesh, a_round
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import felt, one_value
 from pytest_simbench.scene import Body, Coupling, FloatArray, Pose
@@ -33,7 +26,6 @@ class Part:
     """The ground, a body or a link.
 
     Attributes:
-        body: of Drake.
         shapes: its own, or those of the world that are meant.
         frame: in the body's; that of a fixed body, which is a shape of the world, is the shape's.
     """
@@ -117,7 +109,7 @@ class ReadBack(readback.ReadBack):
         place = self.plant.EvalBodyPoseInWorld(self.context, part.body) @ part.frame
         return [*place.translation(), *place.rotation().ToQuaternion().wxyz()]
 
-    def shapes(self, part: Part) -> list[tuple[str, FloatArray]]:
+    def shapes(self, part: Part) -> list[Outline]:
         """Each sphere in a corner (`world`) is one with what it sticks out of least: a box, where
         there are any."""
         found = [self._shape(made, part.frame) for made in self._solids(part)]
@@ -130,22 +122,22 @@ class ReadBack(readback.ReadBack):
                 found[k] = found[k][0], np.maximum(found[k][1], sphere)
         return found
 
-    def _shape(self, made: Any, frame: Any) -> tuple[str, FloatArray]:
+    def _shape(self, made: Any, frame: Any) -> Outline:
         """Kind and reach of a shape in `frame`."""
         shape = self.inspector.GetShape(made)
         place = frame.inverse() @ self.inspector.GetPoseInFrame(made)
         pose = Pose.from_array([*place.translation(), *place.rotation().ToQuaternion().wxyz()])
         if isinstance(shape, geometry.Sphere):
-            return "rounds", round_reach(shape.radius(), 0.0, pose)
+            return a_round(shape.radius(), 0.0, pose)
         if isinstance(shape, geometry.Capsule):
-            return "rounds", round_reach(shape.radius(), shape.length(), pose)
+            return a_round(shape.radius(), shape.length(), pose)
         if isinstance(shape, geometry.Cylinder):
-            return "rounds", cylinder_reach(shape.radius(), shape.length(), pose)
+            return a_cylinder(shape.radius(), shape.length(), pose)
         if isinstance(shape, geometry.Box):
-            return "boxes", box_reach(shape.size(), pose)
+            return a_box(shape.size(), pose)
         hull = self.inspector.GetConvexHull(made)
         corners = [hull.vertex(k) for k in range(hull.num_vertices())]
-        return "meshes", reach(placed(np.array(corners), pose))
+        return a_mesh(np.array(corners), pose)
 
     def inertial(self, part: Part) -> dict[str, Any]:
         inertia = part.body.CalcSpatialInertiaInBodyFrame(self.context)

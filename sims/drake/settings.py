@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
-from pytest_simbench.simulator.ranges import EACH, Linear, Log
+from pytest_simbench.simulator.settings import EACH, Linear, Log
 
 LAGGED = ("approximation", "similar", "lagged")
 

@@ -55,12 +55,10 @@ class World:
 
     Attributes:
         plant, scene_graph: Drake's bodies and joints, and their shapes.
-        scene: what was built.
         prepared: the reduced robot, or None.
         bodies, links, joints, drives: Drake's objects by the scene's names; a fixed box is part of
             the world body.
         shapes: geometry ids by name of the box or link that they belong to, or "ground".
-        model: the robot's model instance.
         springs, brakes: what gives joints a spring and friction of their own, by their names.
         couplings: ids of the constraints between joints.
     """

@@ -17,14 +17,12 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import FOLLOWER, Capability, Deviation, Simulator, SimulatorInfo
 
-from .bindings import MODULES, bindings, library_version
-from .drives import Drives
+from .drives import Drives, Wrenches
 from .readback import ReadBack
 from .sdf import Physics, is_lone, robot_model, world_text
-from .server import Server, new_name
+from .server import MODULES, Server, bindings, library_version, new_name
 from .settings import CHOSEN_ON, PROFILES, GazeboSettings
 from .window import Window
-from .wrenches import Wrenches
 
 PACKAGES = ("python3-numpy", "gz-harmonic")
 """The second is of the Open Source Robotics Foundation's own package archive."""

@@ -18,20 +18,20 @@ from urllib.parse import unquote, urlparse
 import numpy as np
 
 from pytest_simbench.description.shapes import (
-    box_reach,
-    cylinder_reach,
+    Outline,
+    a_box,
+    a_cylinder,
+    a_mesh,
+    a_round,
     mesh_points,
-    placed,
-    reach,
-    round_reach,
 )
+from pytest_simbench.description.urdf import pose_of_rpy
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import Coupling, FloatArray, Pose
 
-from .bindings import bindings
-from .geometry import matrix, number, numbers, pose, pose_in, truth, vector
 from .sdf import robot_model
+from .server import bindings
 
 EVERYTHING = 0xFFFF
 """SDF's default of `collide_bitmask`."""
@@ -44,7 +44,6 @@ class Part:
     Attributes:
         model: that it is a part of, of the bindings.
         link: the entity, of the bindings.
-        element: of the world that the server wrote.
     """
 
     model: Any
@@ -90,12 +89,11 @@ class ReadBack(readback.ReadBack):
     def pose(self, part: Part) -> FloatArray:
         return pose(part.link.world_pose(self.server.ecm)).as_array()
 
-    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
+    def shapes(self, part: Part) -> Iterator[Outline]:
         for collision in part.element.findall("collision"):
             solid = collision.find("geometry/*")
             assert solid is not None
-            kind = {"box": "boxes", "mesh": "meshes"}.get(solid.tag, "rounds")
-            yield kind, _reach(solid, pose_in(collision))
+            yield _outline(solid, pose_in(collision))
 
     def inertial(self, part: Part) -> dict[str, Any]:
         frame = pose(part.link.world_pose(self.server.ecm))
@@ -188,16 +186,16 @@ class ReadBack(readback.ReadBack):
         return [x & y for x, y in product(*masks)]
 
 
-def _reach(solid: ET.Element, at: Pose) -> FloatArray:
-    """The reach of a shape of SDF at a pose."""
+def _outline(solid: ET.Element, at: Pose) -> Outline:
+    """Of a shape of SDF at a pose."""
     if solid.tag == "box":
         size = solid.find("size")
         assert size is not None
-        return box_reach(numbers(size), at)
+        return a_box(numbers(size), at)
     if solid.tag == "mesh":
-        return reach(placed(_points(solid), at))
+        return a_mesh(_points(solid), at)
     radius, length = (number(solid, what, 0.0) for what in ("radius", "length"))
-    return (cylinder_reach if solid.tag == "cylinder" else round_reach)(radius, length, at)
+    return (a_cylinder if solid.tag == "cylinder" else a_round)(radius, length, at)
 
 
 def _points(mesh: ET.Element) -> FloatArray:
@@ -218,3 +216,49 @@ def _motion(joint: ET.Element, axis: ET.Element) -> FloatArray:
     if joint.get("type") == "prismatic":
         return np.concatenate([np.zeros(3), direction])
     return np.concatenate([direction, np.cross(frame.position, direction)])
+
+
+def vector(found: Any) -> FloatArray:
+    """A gz.math.Vector3d, (3,)."""
+    return np.array([found.x(), found.y(), found.z()])
+
+
+def pose(found: Any) -> Pose:
+    """A gz.math.Pose3d."""
+    turn = found.rot()
+    return Pose.from_array([*vector(found.pos()), turn.w(), turn.x(), turn.y(), turn.z()])
+
+
+def matrix(found: Any) -> FloatArray:
+    """A gz.math.Matrix3d, (3, 3)."""
+    return np.array([[found(row, column) for column in range(3)] for row in range(3)])
+
+
+def pose_in(element: ET.Element) -> Pose:
+    """The <pose> of an element of SDF: position, and angles or a quaternion."""
+    found = element.find("pose")
+    if found is None:
+        return Pose()
+    x, y, z, *turn = numbers(found)
+    if found.get("rotation_format") == "quat_xyzw":
+        return Pose((x, y, z), (turn[3], turn[0], turn[1], turn[2]))
+    if found.get("degrees") in ("true", "1"):
+        turn = list(np.radians(turn))
+    return pose_of_rpy((x, y, z), turn)
+
+
+def number(element: ET.Element, path: str, default: float) -> float:
+    """The number at a path below an element of SDF, or SDF's default."""
+    found = element.find(path)
+    return default if found is None else float(found.text or "")
+
+
+def truth(element: ET.Element, path: str, default: bool) -> bool:
+    """The same for what is true or false."""
+    found = element.find(path)
+    return default if found is None else (found.text or "").strip() in ("true", "1")
+
+
+def numbers(element: ET.Element) -> list[float]:
+    """The numbers in an element of SDF."""
+    return [float(value) for value in (element.text or "").split()]

@@ -28,7 +28,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 
-from .drawn import add_drawing
+from .window import add_drawing
 
 VERSION = "1.11"
 """Of SDF; gz-sim 8 reads none newer."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pytest_simbench.simulator import Seen, Settings
-from pytest_simbench.simulator.ranges import EACH, Each, Linear, Log
+from pytest_simbench.simulator.settings import EACH, Each, Linear, Log
 
 DARTSIM = Each(("engine", "dartsim"))
 

@@ -24,7 +24,6 @@ from pytest_simbench.scene import FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
-    NotSupportedError,
     Simulator,
     SimulatorInfo,
     heavy,
@@ -32,7 +31,7 @@ from pytest_simbench.simulator import (
 )
 
 from ..mujoco.bounces import BOUNCES, direct
-from ..mujoco.own_file import FILE_MOVES, of_file
+from ..mujoco.own_file import loaded, of_file
 from .engine import (
     OLDEST,
     array_of,
@@ -147,7 +146,8 @@ class Genesis(Simulator):
         self.solver, self._ground = own.solver, own.entity
         self._boxes = dict[str, Any]()
         self._free = [part.idx for part in own.free]
-        vars(self)["info"] = of_file(type(self).info, own.deviations())  # of this world alone
+        self._touching = own.names(), "geom", own.own.lift
+        loaded(self, own, "")
 
     def _build(self, scene: Scene) -> None:
         world = self.world
@@ -161,7 +161,9 @@ class Genesis(Simulator):
         if self.prepared is not None and self.prepared.robot.closures:
             weld(self.solver, self.prepared)
         self._set_contacts(scene)
-        keep_apart(self.solver.collider, self._links(), scene.apart)
+        links = self._links()
+        self._touching = {link.idx: name for name, link in links.items()}, "link", 0.0
+        keep_apart(self.solver.collider, links, scene.apart)
         self._free = [self._boxes[box.name].links[0].idx for box in scene.free_bodies]
         self._led = [self._boxes[box.name].links[0] for box in scene.prescribed_bodies]
         self._start_bodies(scene)
@@ -247,8 +249,6 @@ class Genesis(Simulator):
         return ReadBack(self).all()
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
-        if self._own_file is not None:
-            raise NotSupportedError(FILE_MOVES)
         self.solver.control_dofs_position_velocity(
             position + effort / self._stiffness, velocity, self._dofs
         )
@@ -277,8 +277,6 @@ class Genesis(Simulator):
         self._steps += 1
 
     def body_state(self) -> FloatArray:
-        if self._own_file is not None:
-            return self._own_file.body_state()
         state = np.empty((len(self._free), 13))
         if self._free:
             state[:, :7] = self._poses(self._free)
@@ -295,8 +293,6 @@ class Genesis(Simulator):
         return np.hstack([position, quaternion / np.linalg.norm(quaternion, axis=1)[:, None]])
 
     def joint_state(self) -> FloatArray:
-        if self._own_file is not None:
-            return self._own_file.joint_state()
         if not self._dofs:
             return np.empty((2, 0))
         return np.stack(
@@ -332,11 +328,7 @@ class Genesis(Simulator):
         return int(array_of(of_collider(self.solver.collider, "collider_state").n_contacts)[0])
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        if self._own_file is not None:
-            names, kind, lift = self._own_file.names(), "geom", self._own_file.own.lift
-        else:
-            names = {link.idx: name for name, link in self._links().items()}
-            kind, lift = "link", 0.0
+        names, kind, lift = self._touching
         up = np.array([0.0, 0.0, lift])
         found = self.solver.collider.get_contacts(as_tensor=True, to_torch=False)
         pairs = zip(found[f"{kind}_a"], found[f"{kind}_b"], strict=True)

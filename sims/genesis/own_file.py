@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.urdf import Link
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
 
-from ..mujoco.imported import Told, compared, deviations, pairs
-from ..mujoco.own_file import OwnFile
-from ..mujoco.touching import collide
+from ..mujoco.constraints import collide
+from ..mujoco.own_file import FILE_MOVES, OwnFile, Told, compared, deviations, pairs
 from .engine import array_of, contact_parameters, numbers, of_collider
 from .readback import ReadBack
 
@@ -58,7 +58,6 @@ class GenesisFile:
     Args:
         scene: as `OwnFile`.
         timestep: [s].
-        world: to which it is added.
 
     Raises:
         NotSupportedError: as `OwnFile`, or the importer refuses the file or leaves out a part.
@@ -121,6 +120,10 @@ class GenesisFile:
         driven = np.flatnonzero(array_of(self.solver.dyn_info.dofs.act_bias)[:, 1]).tolist()
         if driven:  # which pull to nothing before they are told a target: 0, as in MuJoCo
             self.solver.control_dofs_position(np.zeros(len(driven)), driven)
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        """Raises `NotSupportedError`: the file's own actuators move its joints."""
+        raise NotSupportedError(FILE_MOVES)
 
     def body_state(self) -> FloatArray:
         """As `Simulator.body_state`."""
@@ -213,25 +216,13 @@ class FileReadBack(ReadBack):
     def inertial(self, part: Any) -> dict[str, Any]:
         """Of the link and all that is fixed on it."""
         own, body = self.imported.own, self.imported.pose(part.idx) * part.frame
-        found, parts = super().inertial(part), []
+        whole = Link("")
         for link in (k for k in range(own.model.nbody) if own.root(k) == part.idx):
-            frame = body.inverse() * self.imported.pose(link)
             of = super().inertial(self.imported.links[link])
-            turn = frame.rotation()
-            parts.append(
-                (
-                    float(of["mass"]),
-                    turn @ of["com"] + frame.position,
-                    turn @ of["inertia"] @ turn.T,
-                )
-            )
-        mass = sum(m for m, _, _ in parts)
-        centre = sum(m * at for m, at, _ in parts) / mass
-        tensor = np.zeros((3, 3))
-        for m, at, own_tensor in parts:
-            away = at - centre
-            tensor += own_tensor + m * (away @ away * np.eye(3) - np.outer(away, away))
-        return found | {"mass": mass, "com": centre, "inertia": tensor}
+            single = Link("", float(of["mass"]), of["com"], of["inertia"])
+            whole.absorb(single, body.inverse() * self.imported.pose(link))
+        found = {"mass": whole.mass, "com": whole.centre, "inertia": whole.inertia}
+        return super().inertial(part) | found
 
     def _velocity(self, link: Any) -> FloatArray:
         row = next(k for k, part in enumerate(self.imported.free) if part.idx == link.idx)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import box_reach, cylinder_reach, placed, reach, round_reach
+from pytest_simbench.description.shapes import Outline, a_box, a_cylinder, a_mesh, a_round
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import felt, one_value
 from pytest_simbench.scene import Coupling, FloatArray, Pose, rotation_matrix
@@ -90,7 +90,7 @@ class ReadBack(readback.ReadBack):
         place = numbers(self.solver.get_links_pos([part.idx]))[0]
         return np.concatenate([place, numbers(self.solver.get_links_quat([part.idx]))[0]])
 
-    def shapes(self, part: Any) -> Iterator[tuple[str, FloatArray]]:
+    def shapes(self, part: Any) -> Iterator[Outline]:
         for shape in self._shapes(part):
             pose, data = (
                 self.shape_pose(part, shape),
@@ -98,17 +98,17 @@ class ReadBack(readback.ReadBack):
             )
             match genesis.GEOM_TYPE(self._array("geoms", "type")[shape]).name:
                 case "BOX":
-                    yield "boxes", box_reach(data[:3], pose)
+                    yield a_box(data[:3], pose)
                 case "SPHERE":
-                    yield "rounds", round_reach(data[0], 0.0, pose)
+                    yield a_round(data[0], 0.0, pose)
                 case "CAPSULE":
-                    yield "rounds", round_reach(data[0], data[1], pose)
+                    yield a_round(data[0], data[1], pose)
                 case "CYLINDER":
-                    yield "rounds", cylinder_reach(data[0], data[1], pose)
+                    yield a_cylinder(data[0], data[1], pose)
                 case _:
                     ends = (self._array("geoms", f"vert_{end}")[shape] for end in ("start", "end"))
                     corners = self._array("verts", "init_pos")[slice(*ends)].astype(float)
-                    yield "meshes", reach(placed(corners, pose))
+                    yield a_mesh(corners, pose)
 
     def shape_pose(self, part: Any, shape: int) -> Pose:
         """Of a shape in the frame of its part."""

@@ -27,7 +27,7 @@ from pytest_simbench.simulator import (
 )
 
 from .bounces import BOUNCES
-from .own_file import FileReadBack, OwnFile, of_file
+from .own_file import FileReadBack, OwnFile, loaded
 from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from .reading import Reading
@@ -90,9 +90,8 @@ class MuJoCo(Simulator):
     def _load_file(self, scene: Scene) -> None:
         self._own_file = own = OwnFile(scene, self.settings.timestep)
         self.model, self.data = own.model, own.data
-        self._q = self._v = np.array([], dtype=int)
         self._body_ids = own.roots
-        vars(self)["info"] = of_file(self.info, own.deviations())  # of this world alone
+        loaded(self, own)
 
     def _build(self, scene: Scene) -> None:
         self.model = model = build(scene, self.prepared, self.settings)
@@ -129,11 +128,9 @@ class MuJoCo(Simulator):
     def read_back(self) -> dict[str, Any]:
         if self._own_file is not None:
             return FileReadBack(self, self._own_file).all()
-        return ReadBack(self, self.model, self.data, self._numbers()).all()
+        return ReadBack(self, self.model, self.data, self.numbers()).all()
 
-    def _numbers(self) -> Numbers:
-        if self._own_file is not None:
-            return self._own_file.numbers()
+    def numbers(self) -> Numbers:
         model, prepared = self.model, self.prepared
         links = () if prepared is None else prepared.links
         joints = () if prepared is None else prepared.robot.joint_names
@@ -148,9 +145,6 @@ class MuJoCo(Simulator):
         )
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
-        if self._own_file is not None:
-            self._own_file.command(position, velocity, effort)
-            return
         self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
 
     def push(self, wrenches: FloatArray) -> None:
@@ -170,8 +164,6 @@ class MuJoCo(Simulator):
         return float(self.data.time)
 
     def body_state(self) -> FloatArray:
-        if self._own_file is not None:
-            return self._own_file.body_state()
         state = np.empty((len(self._body_q), 13))
         state[:, :7] = self.data.qpos[self._body_q]
         state[:, 7:10] = self.data.qvel[self._body_v]
@@ -179,8 +171,6 @@ class MuJoCo(Simulator):
         return state
 
     def joint_state(self) -> FloatArray:
-        if self._own_file is not None:
-            return self._own_file.joint_state()
         return np.array([self.data.qpos[self._q], self.data.qvel[self._v]])
 
     def save(self) -> FloatArray:
@@ -194,12 +184,10 @@ class MuJoCo(Simulator):
         mujoco.mj_forward(self.model, self.data)
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        if self._own_file is not None:
-            return self._own_file.contact_forces()
-        return contact_forces(self.model, self.data, self._numbers())
+        return contact_forces(self.model, self.data, self.numbers())
 
     def joint_wrenches(self) -> FloatArray:
-        return joint_wrenches(self.model, self.data, self._numbers())
+        return joint_wrenches(self.model, self.data, self.numbers())
 
     def contact_count(self) -> int:
         return int(self.data.ncon)

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pytest_simbench.description import rounded
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED
+from pytest_simbench.description.mesh_check import written_stl
 from pytest_simbench.description.robot_files import digest, keep
-from pytest_simbench.description.stl import written_stl
+from pytest_simbench.description.shapes import capsule_hull, cylinder_hull
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape, write_joint, write_link
 from pytest_simbench.scene import FloatArray, Gripper, Joint, Polytope, Pose, Robot
 from pytest_simbench.scene.pose import vector3
@@ -50,7 +50,6 @@ class OnJoint:
         body: number of the model's body that the joint moves.
         joint: number of the joint.
         above: the link that it hangs on; None: the mount.
-        name: of the link.
         told: name of the joint.
         whole: whether it is the body; else it is between two of the body's joints.
     """
@@ -106,13 +105,8 @@ def on_joints(reading: Reading) -> list[OnJoint]:
 class Tree:
     """The links as a robot.
 
-    Args:
-        reading: of the file.
-        links: of it, at least one.
-
     Attributes:
         drives, limits: of the joints, in their order.
-        constraints: between links.
     """
 
     def __init__(self, reading: Reading, links: list[OnJoint]) -> None:
@@ -198,9 +192,9 @@ class Tree:
         if kind == kinds.mjGEOM_BOX:
             return Shape(pose, size=(2 * a, 2 * b, 2 * c))
         if kind == kinds.mjGEOM_CYLINDER:
-            points, gap = rounded.cylinder(a, b)
+            points, gap = cylinder_hull(a, b)
         elif kind in (kinds.mjGEOM_SPHERE, kinds.mjGEOM_CAPSULE):
-            points, gap = rounded.capsule(a, b if kind == kinds.mjGEOM_CAPSULE else 0.0)
+            points, gap = capsule_hull(a, b if kind == kinds.mjGEOM_CAPSULE else 0.0)
         elif kind == kinds.mjGEOM_MESH:
             corners, own = hull_of(self.reading, geom)
             points, gap, pose = np.array(corners), 0.0, pose * own

@@ -9,14 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import (
-    NO_REACH,
-    box_reach,
-    cylinder_reach,
-    placed,
-    reach,
-    round_reach,
-)
+from pytest_simbench.description.shapes import NO_REACH, Outline, a_box, a_cylinder, a_mesh, a_round
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import Body, Coupling, FloatArray, Pose
@@ -55,7 +48,6 @@ class Part:
 
     Attributes:
         body: MuJoCo's number of what it is a part of; 0: the world.
-        geoms: numbers of its shapes.
         place, turn: of its frame in the world, (3,) [m] and (3, 3).
     """
 
@@ -151,28 +143,28 @@ class ReadBack(readback.ReadBack):
         mujoco.mju_mat2Quat(quaternion, part.turn.ravel())
         return np.concatenate([part.place, quaternion])
 
-    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
+    def shapes(self, part: Part) -> Iterator[Outline]:
         for geom in part.geoms:
             place = part.turn.T @ (self.data.geom_xpos[geom] - part.place)
             turn = part.turn.T @ self.data.geom_xmat[geom].reshape(3, 3)
             yield self._shape(geom, Pose.from_array([*place, *quaternion_of(turn)]))
 
-    def _shape(self, geom: int, pose: Pose) -> tuple[str, FloatArray]:
+    def _shape(self, geom: int, pose: Pose) -> Outline:
         radius, half, _ = size = self.model.geom_size[geom]
         match mujoco.mjtGeom(self.model.geom_type[geom]).name:
             case "mjGEOM_BOX":
-                return "boxes", box_reach(2 * size, pose)
+                return a_box(2 * size, pose)
             case "mjGEOM_SPHERE":
-                return "rounds", round_reach(radius, 0.0, pose)
+                return a_round(radius, 0.0, pose)
             case "mjGEOM_CAPSULE":
-                return "rounds", round_reach(radius, 2 * half, pose)
+                return a_round(radius, 2 * half, pose)
             case "mjGEOM_CYLINDER":
-                return "rounds", cylinder_reach(radius, 2 * half, pose)
+                return a_cylinder(radius, 2 * half, pose)
             case "mjGEOM_MESH":
                 mesh = self.model.geom_dataid[geom]
                 first = self.model.mesh_vertadr[mesh]
                 points = self.model.mesh_vert[first : first + self.model.mesh_vertnum[mesh]]
-                return "meshes", reach(placed(points.astype(float), pose))
+                return a_mesh(points.astype(float), pose)
         return "boxes", NO_REACH
 
     def surface(self, part: Part) -> dict[str, Any]:

@@ -32,8 +32,8 @@ from pytest_simbench.simulator import DescriptionError, lazy_import
 
 from .account import tell_the_rest, values_of
 from .articulated import MOUNT, OnJoint, Tree, on_joints
+from .constraints import apart
 from .shapes import shape_of
-from .touching import apart
 
 mujoco = lazy_import("mujoco")
 
@@ -48,7 +48,6 @@ class Placed:
     Attributes:
         body: of the scene.
         root: number of the model's body that moves it; 0: the world.
-        geoms: numbers of its shapes.
         frame: the scene's frame of the body in that of `root`.
     """
 
@@ -62,16 +61,12 @@ class Reading:
     """A file that was read.
 
     Args:
-        path: absolute.
         spec: what the file says; None: it is read.
 
     Attributes:
-        model, data: compiled, at its start.
         ground: number of the plane that is the ground; None: the file has none.
         falls: whether gravity acts.
         lift: height by which the scene is moved up [m].
-        placed: all bodies of the scene.
-        scene: that the file makes.
 
     Raises:
         DescriptionError: one sentence.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pytest_simbench.description.carried import APPROXIMATED
-from pytest_simbench.description.rounded import directions
+from pytest_simbench.description.shapes import directions
 from pytest_simbench.scene import (
     Body,
     Box,

@@ -275,7 +275,6 @@ def leave_out(model: Any, first: Sequence[int]) -> None:
     mean inertia of all degrees of freedom.
 
     Args:
-        model: of MuJoCo.
         first: degree of freedom of each heavy body.
     """
     light = np.delete(model.dof_M0, [dof + k for dof in first for k in range(6)])

@@ -23,7 +23,6 @@ from pytest_simbench.scene import Body, FloatArray, Scene, rotation_matrix
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
-    NotSupportedError,
     Simulator,
     SimulatorInfo,
     heavy,
@@ -31,7 +30,7 @@ from pytest_simbench.simulator import (
 )
 
 from ..mujoco.bounces import BOUNCES, direct
-from ..mujoco.own_file import FILE_MOVES, FileReadBack, of_file
+from ..mujoco.own_file import FileReadBack, loaded, of_file
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from ..mujoco.settings import FileSettings
@@ -130,7 +129,7 @@ class Newton(Simulator):
         self._own_file = own = NewtonFile(scene, self.settings.timestep)
         self.model, self.solver = own.imported, own.solver
         self._states, self._free, self._control = own.states, own.free, own.imported.control()
-        vars(self)["info"] = of_file(type(self).info, own.deviations())  # of this world alone
+        loaded(self, own)
 
     def _build(self, scene: Scene) -> None:
         self.model = build_model(scene, self.prepared, self.settings)
@@ -207,11 +206,9 @@ class Newton(Simulator):
         if self._own_file is not None:
             return FileReadBack(self, self._own_file).all()
         model, data = self.solver.mj_model, self.solver.mj_data
-        return ReadBack(self, model, data, self._numbers()).all()
+        return ReadBack(self, model, data, self.numbers()).all()
 
-    def _numbers(self) -> Numbers:
-        if self._own_file is not None:
-            return self._own_file.numbers()
+    def numbers(self) -> Numbers:
         prepared = self.prepared
         bodies = self.solver.mjc_body_to_newton.numpy()[0].tolist()
         labels = names(self.model.body_label)
@@ -238,8 +235,6 @@ class Newton(Simulator):
         return numbers
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
-        if self._own_file is not None:
-            raise NotSupportedError(FILE_MOVES)
         self._ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
 
     def push(self, wrenches: FloatArray) -> None:
@@ -263,8 +258,6 @@ class Newton(Simulator):
         self._steps += 1
 
     def body_state(self) -> FloatArray:
-        if self._own_file is not None:
-            return self._own_file.body_state()
         state = self._states[0]
         rows = np.empty((len(self._free), 13))
         if self._free:
@@ -276,8 +269,6 @@ class Newton(Simulator):
         return rows
 
     def joint_state(self) -> FloatArray:
-        if self._own_file is not None:
-            return self._own_file.joint_state()
         state = self._states[0]
         if not len(self._q):
             return np.empty((2, 0))
@@ -306,12 +297,10 @@ class Newton(Simulator):
         self._steps = state["steps"]
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        if self._own_file is not None:
-            return self._own_file.contact_forces()
-        return contact_forces(self.solver.mj_model, self.solver.mj_data, self._numbers())
+        return contact_forces(self.solver.mj_model, self.solver.mj_data, self.numbers())
 
     def joint_wrenches(self) -> FloatArray:
-        return joint_wrenches(self.solver.mj_model, self.solver.mj_data, self._numbers())
+        return joint_wrenches(self.solver.mj_model, self.solver.mj_data, self.numbers())
 
     def contact_count(self) -> int:
         """Contacts that take part in the solution; MuJoCo also lists those within the gap."""

@@ -16,10 +16,9 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
 
-from ..mujoco.imported import CLOSE, Told, compared, deviations, pairs
-from ..mujoco.own_file import OwnFile
+from ..mujoco.constraints import collide
+from ..mujoco.own_file import CLOSE, FILE_MOVES, OwnFile, Told, compared, deviations, pairs
 from ..mujoco.reading import Reading
-from ..mujoco.touching import collide
 
 newton = lazy_import("newton")
 mujoco = lazy_import("mujoco")
@@ -75,8 +74,6 @@ class NewtonFile(OwnFile):
     """The imported file, and its solver.
 
     Attributes:
-        imported: Newton's model.
-        solver: SolverMuJoCo of it.
         states: both of Newton's states, at the start.
         free: Newton's numbers of the free bodies.
 
@@ -116,6 +113,10 @@ class NewtonFile(OwnFile):
         found.links = [replace(k, body=bodies[k.body], joint=joints[k.joint]) for k in own.links]
         self._told = tuple(differences(own, found, bodies, geoms, joints))
         return found
+
+    def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
+        """Raises `NotSupportedError`: the file's own actuators move its joints."""
+        raise NotSupportedError(FILE_MOVES)
 
     def deviations(self) -> tuple[Deviation, ...]:
         """As `OwnFile`, and what the importer did not keep."""

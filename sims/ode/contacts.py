@@ -78,7 +78,6 @@ class Part:
     Attributes:
         surface: of all its shapes.
         frame: of the scene's body or link, in the frame of ODE's body, or in the world.
-        geoms: its shapes.
     """
 
     surface: Surface
@@ -102,7 +101,6 @@ class Contacts:
     """The contact joints of one step.
 
     Args:
-        world: of ODE.
         erp, cfm: share of a penetration that is corrected in a step, and softness [m/(N s)].
         most: joints of a pair of shapes; the deepest contacts become joints.
         along: where a contact slips, all of its friction acts along the slip, as Coulomb's does.

@@ -53,15 +53,12 @@ class Pinion:
     """Two joints that move together.
 
     Args:
-        world: of ODE.
-        pair: which, and how.
         axes: the joints by name; both have a link in common, or the world.
         inertia: of the rotors of both, as the leader has it [kg or kg m^2].
         timestep: [s].
 
     Attributes:
         joints: leader and follower.
-        body: of ODE.
     """
 
     def __init__(

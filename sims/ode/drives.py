@@ -50,8 +50,6 @@ class Rotor:
     """A rotor on a joint, as a motor between the joint's bodies.
 
     Args:
-        world: of ODE.
-        axis: the joint.
         inertia: J as seen at the joint [kg m^2 or kg].
         timestep: [s].
     """
@@ -81,9 +79,6 @@ class Passive:
     """What a joint does by itself: its spring, damping and dry friction.
 
     Args:
-        world: of ODE.
-        axis: the joint.
-        joint: its quantities.
         timestep: [s].
 
     Attributes:
@@ -119,11 +114,7 @@ class Drives:
     """The drives of a robot.
 
     Args:
-        world: of ODE.
-        robot: whose drives they are.
-        axes: its joints by name.
         timestep: [s].
-        drive: kind of drive.
         position_gain: P of the kind `velocity` [1/s].
 
     Attributes:

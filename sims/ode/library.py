@@ -120,7 +120,6 @@ class Convex(_Own):
 
     Args:
         space: of pyode, which the geom is put into.
-        hull: its faces.
     """
 
     def __init__(self, space: Any, hull: Polytope) -> None:

@@ -12,10 +12,11 @@ import numpy as np
 
 from pytest_simbench.description.shapes import (
     DIRECTIONS,
-    box_reach,
-    cylinder_reach,
+    Outline,
+    a_box,
+    a_cylinder,
+    a_round,
     placed,
-    round_reach,
 )
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import felt
@@ -64,7 +65,7 @@ class ReadBack(readback.ReadBack):
     def pose(self, part: Part) -> FloatArray:
         return self._frame(part).as_array()
 
-    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
+    def shapes(self, part: Part) -> Iterator[Outline]:
         frame = self._frame(part)
         for geom in part.geoms:
             if isinstance(geom, Mesh | Convex):
@@ -72,13 +73,13 @@ class ReadBack(readback.ReadBack):
                 continue
             pose = frame.inverse() * pose_of(geom)
             if isinstance(geom, ode.GeomBox):
-                yield "boxes", box_reach(geom.getLengths(), pose)
+                yield a_box(geom.getLengths(), pose)
             elif isinstance(geom, ode.GeomSphere):
-                yield "rounds", round_reach(geom.getRadius(), 0.0, pose)
+                yield a_round(geom.getRadius(), 0.0, pose)
             else:
-                reached = cylinder_reach if isinstance(geom, ode.GeomCylinder) else round_reach
+                outline = a_cylinder if isinstance(geom, ode.GeomCylinder) else a_round
                 radius, length = geom.getParams()
-                yield "rounds", reached(radius, length, pose)
+                yield outline(radius, length, pose)
 
     def surface(self, part: Part) -> dict[str, Any]:
         return {"friction": part.surface.friction, "restitution": part.surface.bounce}

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.links import ends, link_poses, motion_subspace
-from pytest_simbench.description.stl import read_stl
+from pytest_simbench.description.mesh_check import read_stl
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape
 from pytest_simbench.scene import (
     Body,

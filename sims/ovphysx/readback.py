@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.links import link_poses
-from pytest_simbench.description.shapes import DIRECTIONS, box_corners, reach
+from pytest_simbench.description.shapes import DIRECTIONS, Outline, a_box
 from pytest_simbench.description.urdf import Link
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.quantities import kind_of
@@ -45,7 +45,6 @@ class Part:
     """A body or link.
 
     Attributes:
-        path: its prim.
         values: what PhysX tells of all prims of its kind, by attribute and prim.
         made: whose it is: the scene's, which says where its shapes are to be looked for.
     """
@@ -102,7 +101,7 @@ class ReadBack(readback.ReadBack):
     def pose(self, part: Part) -> FloatArray:
         return part.pose.as_array()
 
-    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
+    def shapes(self, part: Part) -> Iterator[Outline]:
         path, made, pose = part.path, part.made, part.pose
         if isinstance(made, Link):
             place = self.places.get(made.name, pose)
@@ -111,7 +110,7 @@ class ReadBack(readback.ReadBack):
                 yield "meshes" if shape.size is None else "boxes", reached
         elif isinstance(made, Box) and part.count:  # rays tell the size of a box more exactly
             size = self.session.size(f"{path}/{usd.shape_name(0)}", pose)
-            yield "boxes", reach(box_corners(size))
+            yield a_box(size, Pose())
         else:
             for k, solid in enumerate(made.parts[: part.count]):
                 reached = self.session.reach(f"{path}/{usd.shape_name(k)}", pose, solid.pose)
@@ -197,7 +196,6 @@ def wrenches(told: FloatArray, prepared: PreparedRobot, positions: FloatArray) -
     Args:
         told: by PhysX of each link by its number in `prepared.links`, (n_links, 6), in the axes of
             the frame of the joint above it, whose x is the joint's axis.
-        prepared: whose joints they are.
         positions: of the joints, (n_joints,).
     """
     names = prepared.robot.joint_names

@@ -17,6 +17,7 @@ import numpy as np
 
 from pytest_simbench.description.shapes import DIRECTIONS
 from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene.pose import turn_of_z
 from pytest_simbench.simulator import lazy_import
 
 ovphysx = lazy_import("ovphysx")
@@ -50,9 +51,6 @@ class Session:
     Args:
         text: the stage, `.usda`.
         threads: workers of PhysX; 0 computes in the calling thread.
-
-    Attributes:
-        physx: the engine.
     """
 
     def __init__(self, text: str, threads: int) -> None:
@@ -151,7 +149,6 @@ class Session:
         """How far a collider reaches in each of `DIRECTIONS`, in the frame at `pose`, (26,) [m].
 
         Args:
-            collider: its prim.
             pose: of the frame, in the world.
             aim: a point in or near the collider, in the frame.
 
@@ -167,7 +164,7 @@ class Session:
                 ovphysx_types.SceneQueryMode.ALL,
                 half_extent=(_SPAN, _SPAN, _FLAT),
                 position=(centre + (_SPAN + _FLAT) * direction).tolist(),
-                rotation=_turn_of_z(direction),
+                rotation=tuple(np.roll(turn_of_z(direction), -1).tolist()),
             )
             distances = [h["distance"] for h in self._of(collider, hits)]
             if distances:
@@ -224,12 +221,3 @@ def _register_schemas() -> None:
         paths = [str(path) for path in schema_support.physx_schema_paths()]
         ovstage.population.register_usd_schemas(paths)
         _registered = True
-
-
-def _turn_of_z(direction: FloatArray) -> tuple[float, float, float, float]:
-    """Quaternion x, y, z, w of the shortest turn from the z axis to `direction`."""
-    x, y, z = (float(value) for value in direction)
-    if z < -1 + 1e-9:
-        return (1.0, 0.0, 0.0, 0.0)
-    length = math.sqrt(2 + 2 * z)
-    return (-y / length, x / length, 0.0, length / 2)

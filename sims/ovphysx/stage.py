@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.description.links import frames, reduced
-from pytest_simbench.description.stl import read_stl
+from pytest_simbench.description.mesh_check import read_stl
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape
 from pytest_simbench.scene import (
     Body,
@@ -77,8 +77,6 @@ class Stage:
     """Writer of one scene.
 
     Args:
-        scene: the world to write.
-        prepared: its robot.
         attributes: of PhysX's schemas, by their prefix (`physxScene`, `physxRigidBody`,
             `physxArticulation`, `physxCollision`) and name; None keeps the schema's default.
     """

@@ -1,8 +1,8 @@
 """PyBullet (Bullet 2.x), through its Python bindings.
 
-Drives are Bullet's own position motors (drives.py). They are not springs: there is no stiffness in
+Drives are Bullet's own position motors (joints.py). They are not springs: there is no stiffness in
 N m/rad, and no effort feed-forward, which they do not need. The fingers' effort limit is the grip's
-squeeze. What joints do beside, and those that have a motor alone (`scene.Joint`): joints.py.
+squeeze. What joints do beside, and those that have a motor alone (`scene.Joint`), is there too.
 
 What was learnt stands in docs/engines/pybullet.md.
 """
@@ -32,8 +32,7 @@ from pytest_simbench.simulator import (
 from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
 
 from .anchors import Anchors
-from .drives import Drives
-from .joints import Pushed, couple, rub
+from .joints import Drives, Pushed, couple, rub
 from .readback import ReadBack, wrench
 from .settings import CHOSEN_ON, PROFILES, PyBulletSettings
 from .world import ROBOT, WORLD, add_body, close_loop, set_surface

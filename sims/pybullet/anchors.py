@@ -26,8 +26,6 @@ class Anchors:
     """Looks after the anchors of one robot.
 
     Args:
-        client: of PyBullet.
-        robot: Bullet's number of the robot.
         timestep: [s].
     """
 
@@ -38,11 +36,7 @@ class Anchors:
         self._made: dict[int, FloatArray] = {}  # a link's rotation when its anchors were made
 
     def step(self, number: int) -> None:
-        """Step the simulation, without anchors on links that have turned.
-
-        Args:
-            number: of steps before this one.
-        """
+        """Step the simulation, without anchors on links that have turned."""
         turned = self._turned() if number % self._every == 0 else []
         for link in turned:
             self._anchor(link, False)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import box_reach, cylinder_reach, placed, reach, round_reach
+from pytest_simbench.description.shapes import Outline, a_box, a_cylinder, a_mesh, a_round
 from pytest_simbench.parity import readback
 from pytest_simbench.scene import Coupling, FloatArray, Pose
 from pytest_simbench.simulator import heavy, lazy_import
@@ -96,22 +96,22 @@ class ReadBack(readback.ReadBack):
             "inertia": axes @ np.diag(dynamics[2]) @ axes.T,
         }
 
-    def shapes(self, part: Part) -> Iterator[tuple[str, FloatArray]]:
+    def shapes(self, part: Part) -> Iterator[Outline]:
         inertial = inertial_frame(self.c, *part)
         for k, (_, _, kind, size, _, place, turn) in enumerate(self._shapes(part)):
             pose = inertial * pose_of(place, turn)
             if kind == pybullet.GEOM_BOX:
-                yield "boxes", box_reach(size, pose)
+                yield a_box(size, pose)
             elif kind == pybullet.GEOM_SPHERE:
-                yield "rounds", round_reach(size[0], 0.0, pose)
+                yield a_round(size[0], 0.0, pose)
             elif kind == pybullet.GEOM_CAPSULE:
-                yield "rounds", round_reach(size[1], size[0], pose)
+                yield a_round(size[1], size[0], pose)
             elif kind == pybullet.GEOM_CYLINDER:
-                yield "rounds", cylinder_reach(size[1], size[0], pose)
+                yield a_cylinder(size[1], size[0], pose)
             else:  # Bullet's own corners, already in the inertial frame
                 mesh = pybullet.getMeshData(*part, collisionShapeIndex=k, physicsClientId=self.c)
                 corners = np.reshape(mesh[1], (-1, 3)) if mesh[0] else np.full((1, 3), np.nan)
-                yield "meshes", reach(placed(corners, inertial))
+                yield a_mesh(corners, inertial)
 
     def _thickness(self, part: Part) -> float:
         """Radius of a sphere or capsule, which are a point and a line to Bullet, their margin the

@@ -27,9 +27,8 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
-from .bodies import ROBOT, WORLD, Groups, add_body, add_ground, groups_apart
+from .bodies import ROBOT, WORLD, Groups, add_body, add_ground, add_own, couple, groups_apart
 from .drawing import Drawing
-from .joints import add_own, couple
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, SAPIENSettings
 

@@ -7,21 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import (
-    NO_REACH,
-    box_reach,
-    cylinder_reach,
-    placed,
-    reach,
-    round_reach,
-)
+from pytest_simbench.description.shapes import NO_REACH, Outline, a_box, a_cylinder, a_mesh, a_round
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import lazy_import
 
+from .bodies import own_of
 from .drawing import UPRIGHT
-from .joints import own_of
 
 physx = lazy_import("sapien.physx")
 
@@ -51,19 +44,18 @@ class ReadBack(readback.ReadBack):
     def pose(self, part: Any) -> FloatArray:
         return np.concatenate([part.entity.pose.p, part.entity.pose.q])
 
-    def shapes(self, part: Any) -> Iterator[tuple[str, FloatArray]]:
+    def shapes(self, part: Any) -> Iterator[Outline]:
         for shape in part.collision_shapes:
             pose = _pose(shape.local_pose)
             if isinstance(shape, physx.PhysxCollisionShapeBox):
-                yield "boxes", box_reach(2 * shape.half_size, pose)
+                yield a_box(2 * shape.half_size, pose)
             elif isinstance(shape, physx.PhysxCollisionShapeConvexMesh):
                 corners = np.asarray(shape.vertices, dtype=float) * shape.scale
-                yield "meshes", reach(placed(corners, pose))
+                yield a_mesh(corners, pose)
             elif hasattr(shape, "radius"):
                 length = 2 * getattr(shape, "half_length", 0.0)
                 pillar = isinstance(shape, physx.PhysxCollisionShapeCylinder)
-                reached = cylinder_reach if pillar else round_reach
-                yield "rounds", reached(shape.radius, length, pose * LYING)
+                yield (a_cylinder if pillar else a_round)(shape.radius, length, pose * LYING)
             else:
                 yield "meshes", NO_REACH
 

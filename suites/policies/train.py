@@ -22,7 +22,7 @@ from pytest_simbench.client.errors import Where, WorkerError
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.motion.servo import Servo
+from pytest_simbench.motion.kinematics import Servo
 from pytest_simbench.tasks import Jitter
 
 FIRST = 900_000

@@ -20,8 +20,8 @@ from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.motion.kinematics import Servo
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.motion.servo import Servo
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.scene.policy import Command, LoopError, Observation, Policy
 from pytest_simbench.tasks import Reaching

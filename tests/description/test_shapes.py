@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pytest_simbench.description.mesh_check import written_stl
 from pytest_simbench.description.shapes import (
     DIRECTIONS,
+    a_cylinder,
+    a_round,
     box_corners,
-    cylinder_reach,
     mesh_points,
     outlines,
     placed,
     reach,
-    round_reach,
 )
-from pytest_simbench.description.stl import written_stl
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import DescriptionError
 
@@ -69,14 +69,14 @@ def test_a_frame_is_turned_and_then_moved() -> None:
 
 def test_reach_of_what_is_round() -> None:
     """A sphere, and a tilted and moved cylinder and capsule by points on their rims."""
-    np.testing.assert_allclose(round_reach(0.3), np.full(26, 0.3))
+    np.testing.assert_allclose(a_round(0.3)[1], np.full(26, 0.3))
     pose = Pose((0.1, -0.2, 0.3), (0.5, 0.5, -0.1, 0.7))
     angles = np.linspace(0, 2 * np.pi, 20000)
     rim = np.stack([0.3 * np.cos(angles), 0.3 * np.sin(angles), 0.4 + 0 * angles], axis=1)
     rims = placed(np.vstack([rim, rim * (1, 1, -1)]), pose)
-    np.testing.assert_allclose(cylinder_reach(0.3, 0.8, pose), reach(rims), atol=1e-6)
+    np.testing.assert_allclose(a_cylinder(0.3, 0.8, pose)[1], reach(rims), atol=1e-6)
     ends = placed(np.array([[0, 0, 0.4], [0, 0, -0.4]]), pose)
-    np.testing.assert_allclose(round_reach(0.3, 0.8, pose), reach(ends) + 0.3)
+    np.testing.assert_allclose(a_round(0.3, 0.8, pose)[1], reach(ends) + 0.3)
 
 
 def test_order_is_by_what_tells_symmetric_shapes_apart() -> None:

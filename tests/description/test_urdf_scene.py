@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pytest_simbench.description.stl import read_stl, written_stl
+from pytest_simbench.description.mesh_check import read_stl, written_stl
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle

@@ -145,8 +145,6 @@ def test_giving_an_example_up_is_no_failure(handle: SimulatorHandle, tmp_path: P
 TAPE = [Operation("wait", {"duration": 0.1}, "fall")]
 EVIL = "\x1b]0;owned\x07\x1b[2Jred\r\u202e"
 
-Data = dict[str, Any]
-
 
 @pytest.fixture
 def path(case: Case) -> Path:

@@ -14,7 +14,7 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.photographer import photograph
 from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.recordings.album import SIZE, Album
+from pytest_simbench.recordings.film import SIZE, Album
 from pytest_simbench.recordings.trace import FOLDER, Trace
 from pytest_simbench.tasks.base import Count, Outcome
 from tests.tiny import Falling

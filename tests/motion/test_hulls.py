@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from pytest_simbench.description.mesh_check import read_stl, written_stl
 from pytest_simbench.description.robot_files import content_of
-from pytest_simbench.description.stl import read_stl, written_stl
 from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.hulls import Cuts, extreme, stl, with_hulls

@@ -10,7 +10,7 @@ import pytest
 from pytest_simbench.suites import test_transfer as suite
 from pytest_simbench.suites.policies import picking, pushing, train
 
-from pytest_simbench.motion.servo import Servo
+from pytest_simbench.motion.kinematics import Servo
 from pytest_simbench.records.tuned_on import FIRST_SEED
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.scene.policy import Command, Observation

@@ -55,18 +55,3 @@ def test_shrinks_to_the_margin_and_tells_how_to_replay(
         for line in told.splitlines()[1:]
     }
     assert moved["cube_04"] > 50 > 10 > moved["cube_01"]
-
-
-def test_a_crash_is_a_finding(towers: Callable[..., Episodes]) -> None:
-    """It does not end the search: the next example gets a fresh worker."""
-    finding = search(towers("Brittle"), {"friction": 0.2}, examples=30)
-    finding.assert_found()
-    assert finding.sentence == "6 % in the friction of all surfaces ends in WorkerExited"
-
-
-def test_noise_is_no_finding(towers: Callable[..., Episodes]) -> None:
-    """A simulator that never does the same twice cannot make the search flaky; what it finds at
-    the edge may not be confirmed."""
-    finding = search(towers("Noisy"), {"x": 0.012}, shrinks=30, at_once=1)
-    assert finding.effect == "topples tower 1"
-    assert 0.007 < finding.amount("x") < 0.009

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
 from typing import Any, ClassVar
 
 import numpy as np
@@ -57,15 +55,6 @@ class Windowed(MuJoCo):
     def _open_window(self) -> None:
         self._viewer = None
         self.model.opt.gravity[0] = 1e-9
-
-
-class Brittle(MuJoCo):
-    """Dies of friction above 1.05."""
-
-    def load(self, scene: Scene) -> None:
-        if scene.ground_friction > 1.05:
-            os.kill(os.getpid(), signal.SIGSEGV)
-        super().load(scene)
 
 
 class Stale(MuJoCo):

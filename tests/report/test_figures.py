@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.experiment.identity import file_stem_of
-from pytest_simbench.recordings.album import Album
+from pytest_simbench.recordings.film import Album
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.figures import front, sweep

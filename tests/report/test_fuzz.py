@@ -28,7 +28,7 @@ from pytest_simbench.description.carried import Carried, keep
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.measure.limits import Limit
-from pytest_simbench.recordings.album import Album
+from pytest_simbench.recordings.film import Album
 from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.records import repeatability
 from pytest_simbench.records.baseline import KEY, BaselineError, read_baseline, to_extra_info

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.ground.errors import PolicyError
+from pytest_simbench.motion.kinematics import FASTEST, Servo
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.motion.servo import FASTEST, Servo
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.scene.policy import Command, Function, LoopError, Policy, Rhythm, as_policy
 from pytest_simbench.scene.set_points import SetPoints, Sight, written

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pytest_simbench.sims.gazebo import bindings, messages
+from pytest_simbench.sims.gazebo import server
 from pytest_simbench.sims.gazebo.sdf import Physics, robot_model, world_text
 from pytest_simbench.sims.gazebo.window import Window
 
@@ -47,26 +47,26 @@ def worlds() -> Iterator[Worlds]:
 
 def test_messages_have_protobufs_form() -> None:
     """As the protobuf compiler's own classes write and read them."""
-    assert messages.reset_request() == b"*\x02\x10\x01"
+    assert server.reset_request() == b"*\x02\x10\x01"
     header = b"\n\x04\n\x02\x08\x07"  # a field that is not asked for
-    assert messages.text_of(header + b"\x12\x05<sdf>") == "<sdf>"
-    assert messages.text_of(b"\x12\xac\x02" + b"x" * 300) == 300 * "x"
-    assert messages.text_of(b"") == ""
+    assert server.text_of(header + b"\x12\x05<sdf>") == "<sdf>"
+    assert server.text_of(b"\x12\xac\x02" + b"x" * 300) == 300 * "x"
+    assert server.text_of(b"") == ""
     for broken in (b"\x12", b"\x12\x05<sd", b"\x0b"):
         with pytest.raises(ValueError, match="the message ends too early|no wire type"):
-            messages.text_of(broken)
+            server.text_of(broken)
 
 
 def test_no_release_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bindings, "RELEASES", {"7": ("json", "gz.no_such_module")})
+    monkeypatch.setattr(server, "RELEASES", {"7": ("json", "gz.no_such_module")})
     with pytest.raises(UnavailableError, match="no release of gz-sim .*: 7: json, gz.no_such_"):
-        bindings.bindings.__wrapped__()
+        server.bindings.__wrapped__()
 
 
 STAND_INS = """
 import sys
 from pytest_simbench.sims.gazebo.adapter import Gazebo
-from pytest_simbench.sims.gazebo.bindings import bindings
+from pytest_simbench.sims.gazebo.server import bindings
 from pytest_simbench.worker.server import _import_engine
 for folder in sys.argv[1:]:
     sys.path[:] = [folder]
@@ -113,7 +113,7 @@ def test_the_release_is_read_off_the_librarys_file() -> None:
         ("7f1-7f2 r-xp 0 08:01 9  /opt/lib/libgz-sim8.so.8.14.0 (deleted)", "8.14.0"),
         ("7f1-7f2 r-xp 0 08:01 9  /opt/lib/libgz-sim8-physics-system.so.8.14.0", None),
     ):
-        found = bindings.LIBRARY.search(line)
+        found = server.LIBRARY.search(line)
         assert (found and found[1]) == release
 
 

@@ -19,7 +19,7 @@ from pytest_simbench.sims.genesis.engine import quick_inspection
 from scipy.spatial import ConvexHull
 
 from pytest_simbench.client.errors import EngineFailed
-from pytest_simbench.description.stl import written_stl
+from pytest_simbench.description.mesh_check import written_stl
 from pytest_simbench.scene import Gripper, Joint, Robot, Scene
 from pytest_simbench.testing import scenes
 

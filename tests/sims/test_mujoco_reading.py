@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -42,8 +41,6 @@ SMALL = """
 </mujoco>
 """
 """A ground, a fixed body, and free ones: of one shape each, a mesh, and of three shapes."""
-
-Read = tuple[Scene, list[Any]]
 
 
 def read(path: Path, text: str = SMALL) -> Reading:

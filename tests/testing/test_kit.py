@@ -13,17 +13,18 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import BUILT_IN, find
 from pytest_simbench.simulator.registry import UnknownSimulatorError
 from pytest_simbench.testing import CHECKS, ConformanceTest, ConformanceWarning, Subject
-from pytest_simbench.testing.checks import any_robot, coupled, grasping
 from pytest_simbench.testing.faults import robot_faults, rounds
 from pytest_simbench.testing.kit import (
     Kit,
+    any_robot,
     conformance_checks,
+    coupled,
+    grasping,
     read_expected_failures,
     reason_for,
     unmatched,
 )
-from pytest_simbench.testing.scenes import at_random, lifted
-from pytest_simbench.testing.touch import approaches, beside, link_clouds
+from pytest_simbench.testing.scenes import approaches, at_random, beside, lifted, link_clouds
 
 LAWS = ("free_fall", "static_hold", "grip_holds", "fingers_stay_coupled")
 KIT = Kit((Subject(MuJoCo),), LAWS, {})

@@ -18,8 +18,6 @@ from tests.records.build import record
 
 from .made_up import target, trials
 
-LAW = Look(LAWS[0])
-
 
 def candidate(errors: list[float], cost: float, of: Target, half: str = "held_out") -> Candidate:
     looks = of.judged if half else of.chosen

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.simulator.ranges import Linear, Searched, searched
 from pytest_simbench.simulator.registry import adapter
+from pytest_simbench.simulator.settings import Linear, Searched, searched
 from pytest_simbench.tuning.steps import between, corners, near, own_values
 
 BASES = {name: adapter(name).profiles["tuned"] for name in ("mujoco", "drake", "sapien")}

@@ -9,7 +9,7 @@ import pytest
 
 from pytest_simbench.data import Toss, Tosses
 from pytest_simbench.laws import LAWS, Law
-from pytest_simbench.laws.held_out import OTHER, held_out
+from pytest_simbench.laws.base import OTHER, held_out
 from pytest_simbench.measure.verdicts import at_least, at_most
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Pose, Scene, Start

@@ -24,8 +24,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.simulator import DivergedError, NotSupportedError
 from pytest_simbench.worker import control
-from pytest_simbench.worker.acting import Acting, prescribed
-from pytest_simbench.worker.stepping import CHECK_PERIOD, Clocks, Stepper
+from pytest_simbench.worker.stepping import CHECK_PERIOD, Acting, Clocks, Stepper, prescribed
 from tests.worker.hosted import Toy
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5, yaw=0.3), mass=0.1)

@@ -14,7 +14,7 @@ from statistics import fmean
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
-from pytest_simbench.recordings.album import FOLDER, Album
+from pytest_simbench.recordings.film import PICTURES, Album
 from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.figures.drawing import drawing
@@ -38,7 +38,7 @@ def albums(run: Path, records: Sequence[Record]) -> tuple[list[tuple[Record, Alb
     found, problems = [], []
     for record in records:
         try:
-            path = inside(run, f"{FOLDER}/{file_stem_of(record)}.npz")
+            path = inside(run, f"{PICTURES}/{file_stem_of(record)}.npz")
             if path.is_file():
                 found.append((record, Album.read(path)))
         except (FolderError, ValueError) as error:

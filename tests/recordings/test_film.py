@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.recordings import film
-from pytest_simbench.recordings.album import GLANCES, SIZE, Album
-from pytest_simbench.recordings.film import Film, FilmsUnavailable
+from pytest_simbench.recordings.film import GLANCES, SIZE, Album, Film, FilmsUnavailable
 from tests.hostile import HOSTILE
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.parity.memory import remembering
+from pytest_simbench.parity.readback import remembering
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import Capability, PreparedRobot, Settings
 from pytest_simbench.testing.faults import FAULTS, rounds, true_scene

@@ -1,4 +1,5 @@
-"""The profile `file` of Newton: what its importer makes of a file, and what it does not keep."""
+"""The profile `file` of Newton and of Genesis: what their importers make of a file, and do not
+keep."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ import pytest
 
 mujoco = pytest.importorskip("mujoco")
 
+from pytest_simbench.sims.genesis.adapter import Genesis  # noqa: E402
 from pytest_simbench.sims.mujoco.adapter import MuJoCo  # noqa: E402
 from pytest_simbench.sims.mujoco.reading import Reading  # noqa: E402
 from pytest_simbench.sims.newton.adapter import Newton  # noqa: E402
@@ -28,6 +30,12 @@ STEP = 1e-3
 @pytest.fixture(scope="module")
 def worlds() -> Iterator[Worlds]:
     with Worlds(Newton) as worlds:
+        yield worlds
+
+
+@pytest.fixture(scope="module")
+def genesis() -> Iterator[Worlds]:
+    with Worlds(Genesis) as worlds:
         yield worlds
 
 
@@ -88,3 +96,36 @@ def test_a_file_that_the_importer_refuses(worlds: Worlds, tmp_path: Path) -> Non
     scene = scene_of(tmp_path, SMALL.replace("<option", '<option solver="PGS"'))
     with pytest.raises(EngineFailed, match="Newton's importer refuses .*scene.xml: .*pgs"):
         worlds.load(scene, "file")
+
+
+ARMATURE = {
+    'name="slide"': 'name="slide" armature=".1"',
+    'name="elbow"': 'name="elbow" armature=".1"',
+    "<worldbody>": '<option integrator="implicitfast"/><worldbody>',
+}
+"""What Genesis adds to joints whose armature a file does not say."""
+
+
+def test_a_file_of_genesis_moves_as_in_mujoco(genesis: Worlds, tmp_path: Path) -> None:
+    """A tenth of a second in the air; one body moved, and parity: masses, places and shapes."""
+    scene = scene_of(tmp_path, SMALL).with_pose("ball", Pose.at(0.01, 0.42, 0.31))
+    world = genesis.load(scene, "file", timestep=STEP)
+    told = [sentence for sentence in world.excused if "importer" in sentence]
+    assert len(told) == 1  # what the importer never reads
+    world.wait(100 * STEP)
+    for body, row in zip(scene.free_bodies, in_mujoco(scene, 100)[0], strict=True):
+        assert world.pose(body.name).as_array() == pytest.approx(row[:7], abs=2e-5)
+
+
+def test_joints_move_as_in_mujoco_but_for_the_armature(genesis: Worlds, tmp_path: Path) -> None:
+    world = genesis.load(scene_of(tmp_path, KITCHEN), "file", timestep=STEP)
+    told = "joint armature is 0.1, in the file 0 (slide, elbow)"
+    assert any(told in sentence for sentence in world.excused)
+    text = KITCHEN
+    for change in ARMATURE.items():
+        text = text.replace(*change, 1)
+    scene = scene_of(tmp_path, text)
+    world = genesis.load(scene, "file", timestep=STEP)
+    assert not any("armature" in sentence for sentence in world.excused)
+    world.wait(100 * STEP)
+    assert world.joints[0] == pytest.approx(in_mujoco(scene, 100)[1][0], abs=2e-3)

@@ -1,0 +1,114 @@
+"""What a robot may have beside drives: a motor alone, in engines that hold drives as velocity
+motors, and in MuJoCo; and links that feel a share of gravity: it lasts, the engine tells it, no
+joint carries the rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pytest_simbench.description.links import borne
+from pytest_simbench.description.urdf import PreparedRobot
+from pytest_simbench.laws.mechanisms import STRONG, Part, Y, mechanism
+from pytest_simbench.scene import STANDARD_GRAVITY, Joint, Scene
+from pytest_simbench.simulator import Simulator
+from pytest_simbench.simulator.registry import adapter
+
+PUSHED = Part("pushed", (0.0, 0.0, 1.0), slides=True, effort=15.0)
+HELD = Part(
+    "held", Y, centre=(0.3, 0.0, 0.0), stiffness=1e4, damping=100.0, effort=STRONG, on="mount"
+)
+ROBOT = mechanism("both", PUSHED, HELD)
+
+
+def loaded(name: str, scene: Scene) -> Simulator:
+    cls = adapter(name)
+    pytest.importorskip(cls.info.modules[0])
+    simulator = cls(cls.profiles["tuned"])
+    simulator.load(scene)
+    return simulator
+
+
+def test_a_motor_is_a_drive_without_stiffness_and_damping() -> None:
+    assert [joint.motor for joint in ROBOT.joints] == [True, False]
+    assert not Part("free", Y).drive.motor  # whose effort limit is next to nothing
+    assert not Part("braked", Y, damping=1.0, effort=STRONG).drive.motor
+    assert "motor" in Scene("both", robot=ROBOT).words
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pybullet", "dart", "sapien"])
+def test_a_motor_pushes_beside_a_drive(name: str) -> None:
+    """Up to its limit, until the next command, also after a state was restored; the drive holds,
+    and the joint's wrench is what the motor pushes."""
+    simulator = loaded(name, Scene("both", robot=ROBOT))
+    rest = np.zeros(2)
+    simulator.command(rest, rest, np.array([100.0, 0.0]))
+    for _ in range(10):
+        simulator.step()
+    gained = (15.0 + STANDARD_GRAVITY[2]) * simulator.time
+    assert simulator.joint_state()[1, 0] == pytest.approx(gained, rel=1e-4)
+    assert abs(simulator.joint_state()[0, 1]) < 1e-3
+    assert simulator.joint_wrenches()[0, :3] == pytest.approx([0.0, 0.0, 15.0], abs=1e-3)
+    state = simulator.save()
+    simulator.command(rest, rest, rest)
+    simulator.step()
+    assert simulator.joint_state()[1, 0] < gained
+    simulator.restore(state)
+    simulator.step()
+    gained = (15.0 + STANDARD_GRAVITY[2]) * simulator.time
+    assert simulator.joint_state()[1, 0] == pytest.approx(gained, rel=1e-4)
+    simulator.close()
+
+
+SHARES = {"half": 0.5, "risen": -0.5, "held": 0.0, "whole": 1.0}
+HALF = Part("half", (0.0, 0.0, 1.0), slides=True, gravity=0.5)
+RISEN = Part("risen", (0.0, 0.0, 1.0), slides=True, on="mount", gravity=-0.5)
+LIFTED, WHOLE = (
+    Part(
+        name, Y, centre=(0.3, 0.0, 0.0), stiffness=1e4, damping=100.0, effort=STRONG, on="mount",
+        gravity=SHARES[name],
+    )
+    for name in ("held", "whole")
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["dart", "drake", "mujoco", "pybullet", "sapien"])
+def test_a_share_of_gravity_lasts(name: str) -> None:
+    scene = Scene("shares", robot=mechanism("shares", HALF, RISEN, LIFTED, WHOLE))
+    assert "link_gravity" in scene.words
+    simulator = loaded(name, scene)
+    half = STANDARD_GRAVITY[2] / 2
+    for restored in (False, True):
+        for _ in range(10):
+            simulator.step()
+        assert simulator.joint_state()[1, :2] / simulator.time == pytest.approx(
+            [half, -half], rel=1e-4
+        )
+        told = {part: simulator.read_back().get(f"link/{part} link/gravity") for part in SHARES}
+        if name == "sapien":  # which tells whether gravity acts
+            assert told == {part: float(share == 1) for part, share in SHARES.items()}
+        elif name != "pybullet":
+            assert told == pytest.approx(SHARES)
+        up = simulator.joint_wrenches()[:, 2]
+        assert up[:3] == pytest.approx(0.0, abs=1e-3)
+        assert up[3] > -half  # it swings
+        if not restored:
+            simulator.restore(simulator.save())
+    simulator.close()
+
+
+def test_a_share_crosses_the_wire() -> None:
+    assert HALF.drive.to_wire()["gravity"] == 0.5
+    assert "gravity" not in WHOLE.drive.to_wire()
+    assert Joint.from_wire(HALF.drive.to_wire()) == HALF.drive
+
+
+def test_forces_are_those_of_each_link() -> None:
+    robot = PreparedRobot(mechanism("shares", HALF, RISEN, LIFTED, WHOLE))
+    forces = borne(robot, (0.0, 1.0, -10.0))
+    assert {name: force.tolist() for name, force in forces.items()} == {
+        "half link": [0.0, -0.5, 5.0],
+        "risen link": [0.0, -1.5, 15.0],
+        "held link": [0.0, -1.0, 10.0],
+    }
+    assert not np.any(borne(robot, (0.0, 1.0, -10.0), felt=0.0)["held link"])
