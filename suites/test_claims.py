@@ -1,0 +1,447 @@
+"""What the field says of simulators, and we of them, asked again. Each claim is a test.
+
+    pytest suites/test_claims.py --sim-data DATA      # all: a quarter of an hour
+    pytest suites/test_claims.py -k mujoco_rk4        # one
+
+A test fails where its claim does not hold; one whose claim cannot be decided passes and says so.
+How that is judged: `referee.py`. A docstring says what is measured, and the limit, fixed before it
+was run. What came of all: docs/claims.md.
+"""
+
+from dataclasses import replace
+
+import pytest
+
+from pytest_simbench.laws import LAWS
+from pytest_simbench.measure.verdicts import at_least, at_most
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.suites.claimed import (
+    LOADS,
+    TOWERS,
+    Gliding,
+    Pile,
+    Rebound,
+    Restored,
+    SpinGain,
+    apart,
+)
+from pytest_simbench.suites.referee import (
+    BROKEN,
+    RATIO,
+    Drawn,
+    broken,
+    claim,
+    over,
+    referee,  # noqa: F401
+)
+from pytest_simbench.tasks import Stacking, Throwing, Tossing
+
+LAW = {law.name: law for law in LAWS}
+STEPS = (1, 2)
+"""Our own step, and half of it."""
+
+DIFFERENCE = Metric("difference", "difference", better=None, least=0.0, resolution=0.0)
+
+MUJOCO = "https://mujoco.readthedocs.io/en/stable"
+NEWS = f"[MuJoCo's changelog, {{}}]({MUJOCO}/changelog.html)"
+DRAKE = "https://drake.mit.edu/doxygen_cxx"
+PHYSX = "https://nvidia-omniverse.github.io/PhysX/physx/5.6.0/_api_build"
+ODE = "[ODE, objects.h](https://bitbucket.org/odedevs/ode/src/master/include/ode/objects.h)"
+OURS = "[our {}]({})"
+
+NOT_HERE = (
+    (
+        "[Genesis' README](https://github.com/Genesis-Embodied-AI/Genesis)",
+        "430,000 times faster than real-time",
+        "it takes a GPU",
+    ),
+    (
+        "[Newton, issue 4003](https://github.com/newton-physics/newton/issues/4003)",
+        "a pinch drops the object in Newton 1.5, and holds it in 1.3",
+        "it takes a GPU, and both releases",
+    ),
+    (
+        f"[Drake's documentation]({DRAKE}/group__contact__engine.html)",
+        "the solver will always succeed",
+        "no number of runs shows *always*",
+    ),
+    (
+        "[DART's paper](https://github.com/dartsim/dart/blob/main/paper.md)",
+        "distinguished by its accuracy and stability",
+        "it names no measure",
+    ),
+)
+"""Who, what, and why it cannot be decided here."""
+
+
+@claim(
+    f"[MuJoCo's documentation]({MUJOCO}/computation/index.html#integrators)",
+    "for energy-conserving systems RK4 is qualitatively better, even when the timestep of "
+    "single-step methods is decreased by a factor of 4",
+)
+def test_mujoco_rk4(referee):
+    """Energy error of a double pendulum, 2 to 4 s: at most a tenth."""
+    law = LAW["double_pendulum_energy"]
+    task = Drawn(law, replace(law, seconds=4.0))
+    for step in (0.004, 0.002):
+        best = referee.ask(task, "mujoco", timestep=step, integrator="RK4")
+        for other in ("Euler", "implicit", "implicitfast"):
+            single = referee.ask(task, "mujoco", timestep=step / 4, integrator=other)
+            referee.rule(f"RK4 over {other}", best, RATIO, at_most(0.1), over(best, single))
+
+
+@claim(
+    f"[MuJoCo's documentation]({MUJOCO}/computation/index.html#gefreebody)",
+    "the kinetic energy of a spinning free body is non-increasing",
+)
+def test_mujoco_spin(referee):
+    """The largest rise within 4 s, implicitfast: at most 1e-7 % of the energy."""
+    task = Drawn(SpinGain(), SpinGain(omega=(1.0, 9.0, -1.0)))
+    for step in (0.004, 0.002, 0.001):
+        found = referee.ask(task, "mujoco", timestep=step)
+        referee.rule("rise [%]", found, "error", at_most(1e-7))
+
+
+@claim(NEWS.format("3.7.0"), "midpoint integration conserves kinetic energy to machine precision")
+def test_mujoco_midpoint(referee):
+    """Energy of a body that turns over for 4 s, in 3.7.0: changes by at most 1e-9 %."""
+    for finer in STEPS:
+        found = referee.ask(Drawn(LAW["tumble_energy"]), "mujoco==3.7.0", finer=finer)
+        referee.rule("change [%]", found, "error", at_most(1e-9))
+
+
+@claim(NEWS.format("3.12.0"), "fixed a bug in the box-box collider causing stacks to explode")
+def test_mujoco_stacks(referee):
+    """Towers of five cubes shifted by up to 1 mm: in 3.11.0 most are lost, in 3.12.0 and 4.0.0 not."""
+    limits = {"3.11.0": at_least(0.5), "3.12.0": at_most(0.5), "4.0.0": at_most(0.5)}
+    for version, limit in limits.items():
+        for finer in STEPS:
+            found = referee.ask(Drawn(*TOWERS), f"mujoco=={version}", finer=finer)
+            referee.rule(f"{version}: broken", found, BROKEN, limit, broken(found))
+
+
+@claim(
+    NEWS.format("3.5.0"), "fixed a bug where derivatives were incorrect when the force was clamped"
+)
+def test_mujoco_clamp(referee):
+    """A drive at its limit (law `effort_limit`): broken in 3.4.0, kept in 3.5.0 and 4.0.0."""
+    limits = {"3.4.0": at_least(0.5), "3.5.0": at_most(0.5), "4.0.0": at_most(0.5)}
+    for version, limit in limits.items():
+        for finer in STEPS:
+            found = referee.ask(Drawn(LAW["effort_limit"]), f"mujoco=={version}", finer=finer)
+            referee.rule(f"{version}: broken", found, BROKEN, limit, broken(found))
+
+
+@claim(
+    "[MuJoCo, issue 3328](https://github.com/google-deepmind/mujoco/issues/3328)",
+    "a pinched object at 20 times its static margin creeps by 50 to 155 µm/s with an elliptic cone "
+    "and impratio 10; in proportion to 1/impratio; noslip makes it a hundredth",
+)
+def test_mujoco_creep(referee):
+    """The Panda holds a cube of a 20th to a 50th of what it can: 0.35 s, at least 17.5 µm; over that with
+    impratio 1 at most 0.2, noslip over that without at most 0.02."""
+    task = Drawn(replace(LAW["grip_holds"], load=0.05), replace(LAW["grip_holds"], load=0.02))
+    for finer in STEPS:
+        recipe = {"profile": "default", "finer": finer, "cone": "elliptic"}
+        found = referee.ask(task, "mujoco", impratio=10.0, **recipe)
+        referee.rule("way [m]", found, "error", at_least(17.5e-6))
+        soft = referee.ask(task, "mujoco", impratio=1.0, **recipe)
+        referee.rule("over impratio 1", found, RATIO, at_most(0.2), over(found, soft))
+        held = referee.ask(task, "mujoco", impratio=10.0, noslip_iterations=10, **recipe)
+        referee.rule("noslip over none", held, RATIO, at_most(0.02), over(held, found))
+
+
+@claim(
+    f"[MuJoCo's documentation]({MUJOCO}/modeling.html#preventing-slip)",
+    "the best way to suppress slip is elliptic cones, large impratio; if that is not sufficient, "
+    "enable noslip",
+)
+def test_mujoco_noslip(referee):
+    """A cube in the hand and a slab on a slope, at 0.7 to 0.8 of the limit, with defaults and ours:
+    impratio 100 and 10 sweeps of noslip keep the law."""
+    for law in ("grip_holds", "creep"):
+        for profile in ("default", "tuned"):
+            for finer in STEPS:
+                found = referee.ask(
+                    Drawn(LAW[law]), "mujoco", profile, finer,
+                    cone="elliptic", impratio=100.0, noslip_iterations=10,
+                )  # fmt: skip
+                referee.rule(f"{law} [tolerances]", found, "ratio", at_most(1.0))
+
+
+@claim(
+    f"[MuJoCo's documentation]({MUJOCO}/computation/index.html#reproducibility)",
+    "the simulation pipeline is entirely deterministic and reproducible",
+)
+def test_mujoco_deterministic(referee):
+    """Piles of six cubes, each in a process of its own, twice: no bit differs after 1 s."""
+    for profile in ("default", "tuned"):
+        one, two = (referee.ask(Pile(run=k), "mujoco", profile) for k in (1, 2))
+        referee.rule("difference [m]", two, DIFFERENCE, at_most(0.0), apart(one, two))
+
+
+@claim(
+    "[Erez, Tassa, Todorov 2015](https://homes.cs.washington.edu/~todorov/papers/ErezICRA15.pdf)",
+    "MuJoCo wins the robotics-related tests (against Bullet, ODE, PhysX)",
+)
+def test_mujoco_wins(referee):
+    """Double pendulum and grip, steps of 1 and 0.5 ms, ours: the others' errors are at least MuJoCo's."""
+    for name in ("double_pendulum", "grip_holds"):
+        for step in (0.001, 0.0005):
+            best = referee.ask(Drawn(LAW[name]), "mujoco", timestep=step)
+            for other in ("pybullet", "ode", "sapien"):
+                found = referee.ask(Drawn(LAW[name]), other, timestep=step)
+                referee.rule(
+                    f"{name}: {other} over MuJoCo", found, RATIO, at_least(1.0), over(found, best)
+                )
+
+
+@claim(
+    f"[Drake's documentation]({DRAKE}/namespacedrake_1_1multibody.html)",
+    "SAP and Similar introduce a spurious effect of gliding in sliding contact, O(δt); Lagged does "
+    "not suffer from this",
+)
+def test_drake_gliding(referee):
+    """How high a slab slides: twice the step at least 1.5 times as high; Lagged over SAP at most 0.1."""
+    task = Drawn(Gliding(), Gliding(speed=1.5, friction=0.4))
+    for finer in STEPS:
+        high = {}
+        for name in ("sap", "similar", "lagged"):
+            high[name] = referee.ask(task, "drake", finer=finer, approximation=name)
+        for name in ("sap", "similar"):
+            low = referee.ask(task, "drake", finer=2 * finer, approximation=name)
+            referee.rule(
+                f"{name} over half the step",
+                high[name],
+                RATIO,
+                at_least(1.5),
+                over(high[name], low),
+            )
+        lagged = high["lagged"]
+        referee.rule("lagged over sap", lagged, RATIO, at_most(0.1), over(lagged, high["sap"]))
+
+
+@claim(
+    f"[Drake's documentation]({DRAKE}/classdrake_1_1multibody_1_1_multibody_plant.html)",
+    "well within the friction cone the slip velocity will always be smaller than v_stiction",
+)
+def test_drake_stiction(referee):
+    """A slab on a slope of half its friction, 1 s: at most 1 s times v_stiction, 0.1 and 1 mm/s."""
+    task = Drawn(replace(LAW["creep"], share=0.5), replace(LAW["creep"], share=0.4, direction=0.9))
+    for profile in ("default", "tuned"):
+        for name in ("lagged", "similar"):
+            for slip in (1e-4, 1e-3):
+                found = referee.ask(
+                    task, "drake", profile, approximation=name, stiction_tolerance=slip
+                )
+                referee.rule(f"{profile}, {slip:g} m/s: way [m]", found, "error", at_most(slip))
+
+
+@claim(
+    f"[PhysX, PxSolverType]({PHYSX}/structPxSolverType.html)",
+    "TGS can handle large mass ratios better than PGS",
+)
+def test_physx_tgs(referee):
+    """Three cubes carry 50 to 100 times their mass: they sink by at most 0.9 times as far."""
+    for name in ("sapien", "ovphysx"):
+        for profile, finer in (("tuned", 1), ("tuned", 2), ("default", 1)):
+            new, old = (
+                referee.ask(Drawn(*LOADS), name, profile, finer, **how)
+                for how in (
+                    ({"tgs": True}, {"tgs": False})
+                    if name == "sapien"
+                    else ({"solver": "TGS"}, {"solver": "PGS"})
+                )
+            )
+            referee.rule(f"{name}: TGS over PGS", new, RATIO, at_most(0.9), over(new, old))
+
+
+@claim(
+    f"[PhysX, PxSceneDesc]({PHYSX}/classPxSceneDesc.html)",
+    "a contact with a relative velocity below bounceThresholdVelocity will not bounce",
+)
+def test_physx_bounce(referee):
+    """A ball of e = 0.8 in SAPIEN, at 0.7 to 0.95 of the threshold leaves with at most 0.05 of its speed;
+    at 1.05 to 1.4 with at least 0.7."""
+    for limit in (2.0, 0.5):
+        for finer in STEPS:
+            for part, ends, rule in (
+                ("below", (0.7, 0.95), at_most(0.05)),
+                ("above", (1.05, 1.4), at_least(0.7)),
+            ):
+                task = Drawn(*(Rebound((share * limit) ** 2 / 2 / 9.80665) for share in ends))
+                found = referee.ask(task, "sapien", finer=finer, bounce_threshold=limit)
+                left = [r.notes.reading.value for r in found.ok]
+                referee.rule(f"{part}: speed left", found, DIFFERENCE, rule, left)
+
+
+@claim(
+    f"[PhysX, PxSceneFlag]({PHYSX}/structPxSceneFlag.html)",
+    "enhanced determinism guarantees that the simulation will not change if actors are added that do "
+    "not interact",
+)
+def test_physx_added_actors(referee):
+    """Piles of six cubes in SAPIEN, alone and with twelve more 3 m away: no bit differs after 1 s."""
+    for profile, finer in (("tuned", 1), ("tuned", 2), ("default", 1)):
+        alone, beside = (
+            referee.ask(Pile(beside=n), "sapien", profile, finer, enhanced_determinism=True)
+            for n in (0, 12)
+        )
+        referee.rule("difference [m]", beside, DIFFERENCE, at_most(0.0), apart(alone, beside))
+
+
+@claim(
+    "[DART's documentation](https://github.com/dartsim/dart/blob/main/docs/readthedocs/index.md)",
+    "a velocity-based LCP to guarantee non-penetration",
+)
+def test_dart_penetration(referee):
+    """How far cubes at rest sink, with DART's defaults and ours: at most what the law allows."""
+    for part, task in (
+        ("one cube", Drawn(LAW["rest_depth"])),
+        ("a tower of five", Drawn(*TOWERS)),
+        ("100 times the mass on top", Drawn(*LOADS)),
+    ):
+        for profile in ("default", "tuned"):
+            for finer in STEPS:
+                found = referee.ask(task, "dart", profile, finer)
+                referee.rule(f"{part} [tolerances]", found, "ratio", at_most(1.0))
+
+
+@claim(ODE, "for large systems QuickStep is a lot faster than dWorldStep, but it is less accurate")
+def test_ode_quickstep(referee):
+    """A pile of 45 cubes: CPU time at most half. Three cubes under 50 to 100 times their mass: sink at
+    least as far."""
+    for profile in ("default", "tuned"):
+        quick, exact = (
+            referee.ask(Pile(cubes=45, seconds=1.5), "ode", profile, solver=name)
+            for name in ("quickstep", "step")
+        )
+        referee.rule(
+            "CPU time over step's", quick, RATIO, at_most(0.5), over(quick, exact, "cpu_cost")
+        )
+        quick, exact = (
+            referee.ask(Drawn(*LOADS), "ode", profile, solver=name)
+            for name in ("quickstep", "step")
+        )
+        referee.rule("sinks over step's", quick, RATIO, at_least(1.0), over(quick, exact))
+
+
+@claim(
+    "[ODE's manual](https://ode.org/wiki/index.php/Manual)",
+    "the simulated system should not explode for no reason",
+)
+def test_ode_explosions(referee):
+    """Piles of six cubes: their energy exceeds that at the start by at most 1 %."""
+    for profile, finer in (("default", 1), ("default", 2), ("tuned", 1)):
+        for solver in ("step", "quickstep"):
+            found = referee.ask(Pile(), "ode", profile, finer, solver=solver)
+            referee.rule(f"{solver}: gain [%]", found, "gain", at_most(1.0))
+
+
+@pytest.mark.reps(5)
+@claim(
+    "[Audonnet et al. 2022](https://arxiv.org/abs/2204.06433)",
+    "PyBullet places 7 to 47 % of the cubes, 18 % on average",
+)
+def test_pybullet_stacks(referee):
+    """By the study's rules, with PyBullet's defaults and with ours: at most 47 %."""
+    for profile in ("default", "tuned"):
+        found = referee.ask(Stacking().study(), "pybullet", profile)
+        referee.rule(f"{profile}: placed", found, "placed", at_most(0.47))
+
+
+@claim(
+    "[Acosta, Yang, Posa 2022](https://arxiv.org/abs/2110.00541)",
+    "fitted to these tosses MuJoCo is off by 25.1 % of the edge, Bullet by 14.9, Drake by 13.5",
+)
+def test_real_tosses(referee, data_set):
+    """Held-out tosses, profile `real`, our step and half: MuJoCo at least 20 %, Bullet and Drake within 3
+    points."""
+    task = Tossing(data_set("cube_tosses"))
+    for name, low, high in (("mujoco", 20, None), ("pybullet", 11.9, 17.9), ("drake", 10.5, 16.5)):
+        for finer in STEPS:
+            found = referee.ask(replace(task, most=None if finer == 1 else 95), name, "real", finer)
+            referee.rule(f"{name} [%]", found, "position_error", at_least(low))
+            if high:
+                referee.rule(f"{name} [%] ", found, "position_error", at_most(high))
+
+
+@claim(
+    OURS.format("issue 35", "reality.md"),
+    "five engines beat every published number on tosses (13.5 %)",
+)
+def test_our_tosses(referee, data_set):
+    """The mean over all tosses there are (no sample, so no interval), `real`: at most 13.5 %."""
+    task = Tossing(data_set("cube_tosses"), half="all")
+    for name in ("mujoco", "pybullet", "sapien", "drake", "ode"):
+        found = referee.ask(task, name, "real")
+        values = found.values("position_error")
+        mean = [sum(values) / len(values)] * len(values)
+        referee.rule(f"{name} [%]", found, DIFFERENCE, at_most(13.5), mean)
+
+
+def keeps(referee, simulator, *phenomena):
+    for law in (law for law in LAWS if law.phenomenon in phenomena):
+        for finer in STEPS:
+            found = referee.ask(Drawn(law), simulator, finer=finer)
+            referee.rule(f"{law.name} [tolerances]", found, "ratio", at_most(1.0))
+
+
+README = OURS.format("README", "../README.md#which-simulator")
+DRAWN = "Each at our step and half of it, its parameters drawn up to the held-out ones: within tolerance."
+
+
+@claim(README, "SAPIEN keeps all 3 laws of grasping")
+def test_our_grasping(referee):
+    keeps(referee, "sapien", "grasping")
+
+
+@claim(README, "SAPIEN keeps all 15 laws of friction and sliding")
+def test_our_sliding(referee):
+    keeps(referee, "sapien", "sticking", "sliding")
+
+
+@claim(README, "DART keeps all 9 laws of impacts")
+def test_our_impacts(referee):
+    keeps(referee, "dart", "impact")
+
+
+@claim(README, "ODE keeps all 7 laws of rolling")
+def test_our_rolling(referee):
+    keeps(referee, "ode", "rolling")
+
+
+for _test in (test_our_grasping, test_our_sliding, test_our_impacts, test_our_rolling):
+    _test.__doc__ = DRAWN
+
+
+@claim(README, "in ODE three cubes of 1 kg carry 100 kg within 0.1 mm; in MuJoCo too")
+def test_our_loads(referee):
+    """50 to 100 kg on cubes shifted by up to 1 mm, our step and half: 0.1 mm."""
+    for name in ("ode", "mujoco"):
+        for finer in STEPS:
+            found = referee.ask(Drawn(*LOADS), name, finer=finer)
+            referee.rule(f"{name} [m]", found, "error", at_most(1e-4))
+
+
+@claim(README, "PyBullet restores a state exact to the bit; so do MuJoCo and Drake")
+def test_our_restore(referee):
+    """Piles saved while they fall: a second later no bit differs."""
+    for name in ("pybullet", "mujoco", "drake"):
+        for finer in STEPS:
+            found = referee.ask(Restored(), name, finer=finer)
+            referee.rule(f"{name} [m]", found, "off", at_most(0.0))
+
+
+@pytest.mark.reps(5)
+@claim(
+    OURS.format("page on runs", "runs.md#read-the-tables"),
+    "the minute before the count ends early when nothing can change it",
+)
+def test_our_wait(referee):
+    """Throws with the whole minute and with the cut one, five seeds: as many cubes moved."""
+    for name in ("mujoco", "pybullet", "sapien", "ode"):
+        whole, cut = (referee.ask(Throwing(full_wait=full), name) for full in (True, False))
+        one, two = whole.by_seed("moved"), cut.by_seed("moved")
+        values = [abs(one[seed] - two[seed]) for seed in one]
+        referee.rule(f"{name}: moved", cut, DIFFERENCE, at_most(0.0), values)
