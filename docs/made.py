@@ -1,6 +1,7 @@
 """Tables and pages made of docs/data: those of the site when it is built, and the README's.
 
-python docs/made.py                        writes the README's table and the pictures
+python docs/made.py                        writes the tables of the README and of claims.md, and the
+                                           pictures
 python docs/made.py RUN...                 reads run folders into docs/data, each repetition into
                                            the CSV of its task
 python docs/made.py --as RULES COMMIT RUN...
@@ -8,8 +9,8 @@ python docs/made.py --as RULES COMMIT RUN...
                                            ones; RULES is a word of `published_runs.RULES`, COMMIT
                                            that of the code that ran
 
-A table stands where a page has the line `<!-- made: WORD WORD -->`, see `TABLES`. The README has
-its own in git, up to a line `<!-- end -->`. `conf.py` calls `write_pages` and `filled`.
+A table stands where a page has the line `<!-- made: WORD WORD -->`, see `TABLES`. `IN_GIT` have
+theirs in git, up to a line `<!-- end -->`. `conf.py` calls `write_pages` and `filled`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from collections.abc import Callable, Sequence
 from itertools import groupby
 from pathlib import Path
 
+import make_claims
 import make_results
 import make_tasks
 import make_truth
@@ -30,6 +32,8 @@ from tables import DATA, DOCS, table
 from pytest_simbench.records.folder import RunFolder
 
 README = DOCS.parent / "README.md"
+IN_GIT = (README, DOCS / "claims.md")
+"""Pages that hold their tables."""
 MARK = re.compile(r"<!-- made: ([\w ]+) -->\n(?:(?:(?!<!-- made:).)*?<!-- end -->\n?)?", re.S)
 
 
@@ -50,6 +54,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "phenomena": make_truth.phenomena,
     "over_steps": make_truth.over_steps,
     "planted": planted,
+    "claims": make_claims.claims,
 }
 """By the first word of a mark, the others are arguments; beside those of `make_results`."""
 
@@ -66,13 +71,12 @@ def _made(words: str) -> str:
     return TABLES[first](*others)
 
 
-def readme() -> str:
-    """The README with its table."""
-    made = MARK.sub(
+def readme(page: Path = README) -> str:
+    """The README, or another page of git, with its tables."""
+    return MARK.sub(
         lambda mark: f"<!-- made: {mark[1]} -->\n\n{_made(mark[1])}\n\n<!-- end -->\n",
-        README.read_text("utf-8"),
+        page.read_text("utf-8"),
     )
-    return made
 
 
 def kept_pages() -> dict[str, str]:
@@ -108,7 +112,10 @@ def write_pages() -> None:
 def read(folders: Sequence[str], **published: str) -> None:
     """Run folders into the CSVs."""
     for folder in folders:
-        records = RunFolder(Path(folder)).read().records
+        run = RunFolder(Path(folder)).read()
+        if make_claims.read(run):
+            continue
+        records = run.records
         laws = make_truth.SWEEP if any(r.swept for r in records) else make_truth.TRUTH
         for kept in (laws, make_tasks.ARMS, make_tasks.PUSHING, *make_tasks.EXPERIMENTS.values()):
             kept.read(records)
@@ -123,7 +130,8 @@ def main(arguments: list[str]) -> None:
     elif arguments:
         read(arguments)
     else:
-        README.write_text(readme(), "utf-8")
+        for page in IN_GIT:
+            page.write_text(readme(page), "utf-8")
         make_results.draw()
         make_truth.draw()
 

@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.world import World
+from pytest_simbench.laws import LAWS
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, watch
 from pytest_simbench.laws.contact import EDGE, HeavyOnTop, Tower
 from pytest_simbench.laws.free import TumbleEnergy
@@ -18,6 +18,13 @@ from pytest_simbench.laws.sliding import StoppingDistance
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Vector3
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Task
+
+LAW = {law.name: law for law in LAWS}
+
+STEPS = (1, 2)
+"""By which our own time step is divided."""
+
+DIFFERENCE = Metric("difference", "difference", better=None, least=0.0, resolution=0.0)
 
 MOVED = 1e-3
 """By which cubes of a stack may be shifted on those below [m]."""
@@ -119,11 +126,11 @@ class Pile(Task):
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         rng, bodies = np.random.default_rng(seed), []
+        rows = 3 if self.cubes > 9 else 1  # of three cubes in a layer
         for k in range(self.cubes):
-            x, y = rng.uniform(-0.04, 0.04, 2) + 0.3 * np.array([k % 3, k // 3 % 3])
+            x, y = rng.uniform(-0.008, 0.008, 2) + 0.19 * np.array([k % 3, k // 3 % rows])
             turn = rng.normal(size=4)
-            w, i, j, l = (turn / np.linalg.norm(turn)).tolist()  # noqa: E741
-            at = Pose((float(x), float(y), 0.12 + 0.2 * (k // 9) + 0.05 * (k % 2)), (w, i, j, l))
+            at = Pose((float(x), float(y), 0.12 + 0.19 * (k // (3 * rows))), unit(turn))
             bodies.append(Box(f"cube {k}", (EDGE,) * 3, at, 1.0, 0.5))
         for k in range(self.beside):
             at = Pose.at(-3.0, 0.3 * k, EDGE / 2 + 0.1)
@@ -138,6 +145,11 @@ class Pile(Task):
         return Outcome({"gain": _gain(rows), "off": None}, {"end": rows[-1].ravel().tolist()})
 
 
+def unit(turn: FloatArray) -> tuple[float, float, float, float]:
+    w, x, y, z = (turn / np.linalg.norm(turn)).tolist()
+    return w, x, y, z
+
+
 def _gain(rows: FloatArray) -> float:
     """By how much energy exceeds that of the first row at most [%]; rows (n, cubes, 13)."""
     falls = GRAVITY * rows[:, :, 2]
@@ -149,8 +161,8 @@ def _gain(rows: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class Restored(Pile):
-    """The same, saved while the cubes fall and restored a second later: how far is a cube from where
-    it was at first?"""
+    """The same, saved while the cubes fall and restored a second later: how far is a cube from
+    where it was at first?"""
 
     name: ClassVar[str] = "restored_pile"
 

@@ -42,6 +42,8 @@ OF = {"PASS": HOLDS, "FAIL": FAILS}
 DRAWS = 8
 """Of a law's parameters."""
 
+FAR = 1000.0
+
 
 def verdict(parts: Mapping[str, Iterable[str]]) -> str:
     """Of a claim, from the verdicts (PASS, FAIL, UNDECIDED) on all ways of each part."""
@@ -142,7 +144,9 @@ class Referee:
             values = of.values(metric.name)
         found = interval(list(values or ()), metric, confidence(metric))
         judged = judge(claim, found)
-        if of.crashed and not metric.bounded:  # what did not finish speaks for nobody
+        if (
+            of.crashed and not metric.bounded and metric is not RATIO
+        ):  # what did not finish speaks for nobody
             judged = Judgement(Verdict.NOT_JUDGED, claim, found)
         line = claim_of(self.asked[id(of)].case, of, metric, judged)
         line = replace(line, variant=f"{part}: {line.variant}", test=f"{line.test} {part}")
@@ -157,8 +161,8 @@ class Referee:
         print(found, *self.told, sep="\n")
 
 
-@pytest.fixture
-def referee(request: pytest.FixtureRequest) -> Referee:
+@pytest.fixture(name="referee")
+def of_a_claim(request: pytest.FixtureRequest) -> Referee:
     """Of one claim; it works where somebody names the file, for all take a quarter of an hour."""
     stem = request.path.stem
     if not any(stem in arg for arg in request.config.args):
@@ -191,6 +195,9 @@ RATIO = Metric("ratio of errors", "ratio of errors", better=None, least=0.0, res
 
 
 def over(a: ResultSet, b: ResultSet, metric: str = "error") -> list[float]:
-    """A metric of one over that of another, seed by seed."""
+    """A metric of one over that of another, seed by seed; a world that diverged is `FAR` times as
+    far off as one that did not."""
     first, second = a.by_seed(metric), b.by_seed(metric)
-    return [first[seed] / second[seed] for seed in first if second.get(seed)]
+    lost = [{r.seed for r in each.crashed} for each in (a, b)]
+    found = [first[seed] / second[seed] for seed in first if second.get(seed)]
+    return found + [FAR] * len(lost[0] - lost[1]) + [1 / FAR] * len(lost[1] - lost[0])
