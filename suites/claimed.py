@@ -50,6 +50,7 @@ class ShakenLoad(HeavyOnTop, name="shaken_load"):
 
 
 TOWERS = ShakenTower(), ShakenTower(overhangs=(MOVED,) * 4)
+ALIGNED = ShakenTower(overhangs=(-1e-12,) * 4), ShakenTower(overhangs=(1e-12,) * 4)
 LOADS = ShakenLoad(), ShakenLoad(top=50.0, overhangs=(MOVED,) * 3)
 """Between which the seed draws."""
 

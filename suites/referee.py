@@ -61,13 +61,14 @@ class Drawn(Task):
         law: with its own parameters.
         other: the same law with other ones; None: the held-out ones, and where there are none the
             law is as it is.
+        repetitions: draws.
     """
 
     law: Law
     other: Law | None = None
+    repetitions: int = DRAWS  # type: ignore[assignment]
     study_timeout = Law.study_timeout
     shares_worker = True
-    repetitions = DRAWS
 
     @property
     def name(self) -> str:  # type: ignore[override]
@@ -191,13 +192,13 @@ def broken(result: ResultSet) -> list[float]:
 
 
 BROKEN = Metric("broken", "broken", better=None, kind="yes_no")
-RATIO = Metric("ratio of errors", "ratio of errors", better=None, least=0.0, resolution=0.0)
+RATIO = Metric("ratio", "ratio", better=None, least=0.0, resolution=0.0)
 
 
 def over(a: ResultSet, b: ResultSet, metric: str = "error") -> list[float]:
-    """A metric of one over that of another, seed by seed; a world that diverged is `FAR` times as
+    """A metric of one over that of another, seed by seed. A world that diverged is `FAR` times as
     far off as one that did not."""
     first, second = a.by_seed(metric), b.by_seed(metric)
-    lost = [{r.seed for r in each.crashed} for each in (a, b)]
     found = [first[seed] / second[seed] for seed in first if second.get(seed)]
+    lost = [{r.seed for r in each.crashed} if metric == "error" else set() for each in (a, b)]
     return found + [FAR] * len(lost[0] - lost[1]) + [1 / FAR] * len(lost[1] - lost[0])

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import pytest
 from pytest_simbench.suites.claimed import (
+    ALIGNED,
     DIFFERENCE,
     LAW,
     LOADS,
@@ -20,6 +21,7 @@ from pytest_simbench.suites.claimed import (
     Gliding,
     Pile,
     Rebound,
+    ShakenLoad,
     SpinGain,
     apart,
 )
@@ -97,25 +99,31 @@ def test_mujoco_spin(referee):
 
 @claim(NEWS.format("3.7.0"), "midpoint integration conserves kinetic energy to machine precision")
 def test_mujoco_midpoint(referee):
-    """Energy of a body that turns over for 4 s, in 3.7.0: changes by at most 1e-9 %."""
+    """Energy of a body that turns over for 4 s, in 3.7.0: changes by at most 1e-7 %."""
     for finer in STEPS:
         found = referee.ask(Drawn(LAW["tumble_energy"]), "mujoco==3.7.0", finer=finer)
-        referee.rule("change [%]", found, "error", at_most(1e-9))
+        referee.rule("change [%]", found, "error", at_most(1e-7))
 
 
-def releases(referee, task, before, *after):
-    """A law that MuJoCo broke before, and keeps after."""
-    for version in (before, *after):
+def releases(referee, task, *limits):
+    """How often a law is broken in releases of MuJoCo, each with its limit."""
+    for version, limit in limits:
         for finer in STEPS:
             found = referee.ask(task, f"mujoco=={version}", finer=finer)
-            limit = at_least(0.5) if version == before else at_most(0.5)
             referee.rule(f"{version}: broken", found, BROKEN, limit, broken(found))
 
 
-@claim(NEWS.format("3.12.0"), "fixed a bug in the box-box collider causing stacks to explode")
+@claim(
+    NEWS.format("3.12.0"),
+    "fixed a bug in the box-box collider where near-degenerate face clipping causes resting stacks "
+    "to explode",
+)
 def test_mujoco_stacks(referee):
-    """Towers of five cubes shifted by up to 1 mm: most are lost in 3.11.0, not in 3.12.0, 4.0.0."""
-    releases(referee, Drawn(*TOWERS), "3.11.0", "3.12.0", "4.0.0")
+    """20 towers of five cubes, shifted by up to 1 pm: at least 5 % are lost in 3.10.0, at most 15 %
+    in 3.12.0 and 4.0.0."""
+    task = Drawn(*ALIGNED, repetitions=20)
+    after = at_most(0.15)
+    releases(referee, task, ("3.10.0", at_least(0.05)), ("3.12.0", after), ("4.0.0", after))
 
 
 @claim(
@@ -123,7 +131,8 @@ def test_mujoco_stacks(referee):
 )
 def test_mujoco_clamp(referee):
     """A drive at its limit (law `effort_limit`): broken in 3.4.0, kept in 3.5.0 and 4.0.0."""
-    releases(referee, Drawn(LAW["effort_limit"]), "3.4.0", "3.5.0", "4.0.0")
+    task, after = Drawn(LAW["effort_limit"]), at_most(0.5)
+    releases(referee, task, ("3.4.0", at_least(0.5)), ("3.5.0", after), ("4.0.0", after))
 
 
 @claim(
@@ -179,15 +188,16 @@ def test_mujoco_deterministic(referee):
     "MuJoCo wins the robotics-related tests (against Bullet, ODE, PhysX)",
 )
 def test_mujoco_wins(referee):
-    """Double pendulum and grip, 1 and 0.5 ms, ours: others' errors are at least MuJoCo's."""
+    """Double pendulum and grip, 1 and 0.5 ms, ours: others' errors and CPU times are at least
+    MuJoCo's."""
     for name in ("double_pendulum", "grip_holds"):
         for step in (0.001, 0.0005):
             best = referee.ask(Drawn(LAW[name]), "mujoco", timestep=step)
             for other in ("pybullet", "ode", "sapien"):
                 found = referee.ask(Drawn(LAW[name]), other, timestep=step)
-                referee.rule(
-                    f"{name}: {other} over MuJoCo", found, RATIO, at_least(1.0), over(found, best)
-                )
+                for metric in ("error", "cpu_cost"):
+                    part = f"{name}, {metric}: {other} over MuJoCo"
+                    referee.rule(part, found, RATIO, at_least(1.0), over(found, best, metric))
 
 
 @claim(
@@ -199,21 +209,20 @@ def test_drake_gliding(referee):
     """Height of a slab that slides: at twice the step at least 1.5 times; Lagged over SAP at most
     0.1."""
     task = Drawn(Gliding(), Gliding(speed=1.5, friction=0.4))
-    for finer in STEPS:
-        high = {}
-        for name in ("sap", "similar", "lagged"):
-            high[name] = referee.ask(task, "drake", finer=finer, approximation=name)
-        for name in ("sap", "similar"):
-            low = referee.ask(task, "drake", finer=2 * finer, approximation=name)
-            referee.rule(
-                f"{name} over half the step",
-                high[name],
-                RATIO,
-                at_least(1.5),
-                over(high[name], low),
-            )
-        lagged = high["lagged"]
-        referee.rule("lagged over sap", lagged, RATIO, at_most(0.1), over(lagged, high["sap"]))
+    for part, how in (
+        ("sap", {"relaxation_time": 0.01}),
+        ("sap", {"relaxation_time": 0.1}),
+        ("sap, relaxation time of 0.1 ms", {"relaxation_time": 1e-4}),
+        ("similar", {}),
+    ):
+        how["approximation"] = part[:3] if part.startswith("sap") else part
+        for finer in STEPS:
+            high, low = (referee.ask(task, "drake", finer=n * finer, **how) for n in (1, 2))
+            values = over(high, low)
+            referee.rule(f"{part}: over half the step", high, RATIO, at_least(1.5), values)
+            if part == "sap":
+                lagged = referee.ask(task, "drake", finer=finer, approximation="lagged")
+                referee.rule("lagged over sap", lagged, RATIO, at_most(0.1), over(lagged, high))
 
 
 @claim(
@@ -229,7 +238,7 @@ def test_drake_stiction(referee):
                 found = referee.ask(
                     task, "drake", profile, approximation=name, stiction_tolerance=slip
                 )
-                referee.rule(f"{profile}, {slip:g} m/s: way [m]", found, "error", at_most(slip))
+                referee.rule(f"{slip:g} m/s: way [m]", found, "error", at_most(slip))
 
 
 @claim(
@@ -237,11 +246,12 @@ def test_drake_stiction(referee):
     "TGS can handle large mass ratios better than PGS",
 )
 def test_physx_tgs(referee):
-    """Three cubes carry 50 to 100 times their mass: they sink by at most 0.9 times as far."""
+    """Three cubes carry 10 to 30 times their mass: they sink by at most 0.9 times as far."""
+    task = Drawn(ShakenLoad(top=10.0), replace(LOADS[1], top=30.0))
     for name in ("sapien", "ovphysx"):
         for profile, finer in (("tuned", 1), ("tuned", 2), ("default", 1)):
             new, old = (
-                referee.ask(Drawn(*LOADS), name, profile, finer, **how)
+                referee.ask(task, name, profile, finer, **how)
                 for how in (
                     ({"tgs": True}, {"tgs": False})
                     if name == "sapien"
@@ -304,18 +314,18 @@ def test_dart_penetration(referee):
 
 @claim(ODE, "for large systems QuickStep is a lot faster than dWorldStep, but it is less accurate")
 def test_ode_quickstep(referee):
-    """A pile of 27 cubes: CPU time at most half. Three cubes under 50 to 100 times their mass: they
+    """A pile of 54 cubes: CPU time at most half. Three cubes under 50 to 100 times their mass: they
     sink at least as far."""
-    for profile in ("default", "tuned"):
+    for finer in (4, 8):
         quick, exact = (
-            referee.ask(Pile(cubes=27), "ode", profile, solver=name)
+            referee.ask(Pile(cubes=54, seconds=1.5), "ode", "default", finer, solver=name)
             for name in ("quickstep", "step")
         )
         referee.rule(
             "CPU time over step's", quick, RATIO, at_most(0.5), over(quick, exact, "cpu_cost")
         )
         quick, exact = (
-            referee.ask(Drawn(*LOADS), "ode", profile, solver=name)
+            referee.ask(Drawn(*LOADS), "ode", "default", finer, solver=name)
             for name in ("quickstep", "step")
         )
         referee.rule("sinks over step's", quick, RATIO, at_least(1.0), over(quick, exact))

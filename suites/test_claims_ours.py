@@ -48,7 +48,7 @@ def keeps(referee, simulator, *phenomena):
     """Each law, its parameters drawn up to the held-out ones, within its tolerance."""
     for law in (law for law in LAWS if law.phenomenon in phenomena):
         for finer in STEPS:
-            found = referee.ask(Drawn(law), simulator, finer=finer)
+            found = referee.ask(Drawn(law, repetitions=20), simulator, finer=finer)
             referee.rule(f"{law.name} [tolerances]", found, "ratio", at_most(1.0))
 
 
@@ -77,7 +77,7 @@ def test_our_loads(referee):
     """50 to 100 kg on cubes shifted by up to 1 mm, our step and half: 0.1 mm."""
     for name in ("ode", "mujoco"):
         for finer in STEPS:
-            found = referee.ask(Drawn(*LOADS), name, finer=finer)
+            found = referee.ask(Drawn(*LOADS, 20), name, finer=finer)
             referee.rule(f"{name} [m]", found, "error", at_most(1e-4))
 
 
