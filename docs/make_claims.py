@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from datetime import date
-from math import isfinite
 
 from pytest_simbench.suites import test_claims, test_claims_ours
 from pytest_simbench.suites.referee import verdict
@@ -34,8 +33,8 @@ def lines() -> list[Line]:
 
 
 def read(run: RunContents) -> bool:
-    """Put the claims of a run into the file, in place of what was known of them; whether any is one
-    of the suite. The other records of such a run are of no published table."""
+    """Put a run's claims of the suite into the file, in place of what was known of them; whether
+    there are any. The records of such a run are of no published table."""
     new, today = [], date.today().isoformat()
     for claim in run.claims:
         name = claim.function.rpartition("::test_")[2]
@@ -47,13 +46,15 @@ def read(run: RunContents) -> bool:
             asked = (name, part, claim.simulator, way, str(claim.relation), f"{claim.threshold:g}")
             row = (*asked, claim.verdict, *numbers, str(claim.n), version, today)
             new.append(dict(zip(COLUMNS, row, strict=True)))
+    if not new:
+        return False
     names = {line["claim"] for line in new}
     kept = [line for line in lines() if line["claim"] not in names]
     with FILE.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
         writer.writerows([*kept, *new])
-    return bool(new)
+    return True
 
 
 def claims(what: str) -> str:
@@ -82,14 +83,16 @@ def _verdicts() -> str:
 
 def _numbers(part: str, of: list[Line]) -> str:
     """Of all ways in which a part was asked: their means, and the ends of their intervals."""
-    low, *_, high = sorted(float(line["mean"]) for line in of for _ in "ab")
+    means = sorted(float(line["mean"]) for line in of)
+    told = " to ".join(dict.fromkeys(f"{mean:.2g}" for mean in (means[0], means[-1])))
+    low = min(float(line["low"] or line["mean"]) for line in of)
+    high = max(float(line["high"] or line["mean"]) for line in of)
+    ends = f" [{low:.2g}, {high:.2g}]" if low < high else ""
     kept = sum(line["verdict"] == "PASS" for line in of)
-    mean = f"{low:.3g}" if f"{low:.3g}" == f"{high:.3g}" else f"{low:.3g} to {high:.3g}"
-    ends = min(float(n["low"]) for n in of), max(float(n["high"]) for n in of)
-    bounds = f" [{ends[0]:.3g}, {ends[1]:.3g}]" if isfinite(ends[1] - ends[0]) else ""
-    return f"{part} {mean}{bounds}" + (f" ({kept} of {len(of)} ways)" if kept < len(of) else "")
+    return f"{part} {told}{ends}" + (f" ({kept} of {len(of)} ways)" if kept < len(of) else "")
 
 
 def _versions() -> str:
-    asked = sorted({(n["simulator"], n["version"], n["date"]) for n in lines()})
-    return table(("simulator", "version", "asked on"), asked, 3)
+    """Of releases the parts tell."""
+    found = sorted({(n["simulator"], n["version"], n["date"]) for n in lines()})
+    return table(("simulator", "version", "asked on"), [f for f in found if "==" not in f[0]], 3)

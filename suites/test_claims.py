@@ -56,11 +56,6 @@ NOT_HERE = (
         "it takes a GPU, and both releases",
     ),
     (
-        f"[Drake's documentation]({DRAKE}/group__contact__engine.html)",
-        "the solver will always succeed",
-        "no number of runs shows *always*",
-    ),
-    (
         "[DART's paper](https://github.com/dartsim/dart/blob/main/paper.md)",
         "distinguished by its accuracy and stability",
         "it names no measure",
