@@ -3,7 +3,15 @@
 from dataclasses import replace
 
 import pytest
-from pytest_simbench.suites.claimed import DIFFERENCE, LOADS, STEPS, Restored
+from pytest_simbench.suites.claimed import (
+    DIFFERENCE,
+    LOADS,
+    STEPS,
+    TOWERS,
+    Pile,
+    Restored,
+    apart,
+)
 from pytest_simbench.suites.referee import Drawn, claim, of_a_claim  # noqa: F401
 
 from pytest_simbench.laws import LAWS
@@ -79,6 +87,29 @@ def test_our_loads(referee):
         for finer in STEPS:
             found = referee.ask(Drawn(*LOADS, 20), name, finer=finer)
             referee.rule(f"{name} [m]", found, "error", at_most(1e-4))
+
+
+@claim(
+    OURS.format("page on laws", "truth.md#which-simulator-is-right-about-what"),
+    "equal cubes stand in all ten, within 1 mm",
+)
+def test_our_towers(referee):
+    """Towers of five, shifted by up to 1 mm, our step and half: the top moves by at most 1 mm."""
+    for name in ("mujoco", "pybullet", "drake", "sapien", "dart", "ode"):
+        for finer in STEPS:
+            found = referee.ask(Drawn(*TOWERS), name, finer=finer)
+            referee.rule(f"{name} [m]", found, "error", at_most(1e-3))
+
+
+@claim(
+    OURS.format("page on repeatability", "repeatability.md"),
+    "the same commands give the same result, to the last bit, in all that were asked",
+)
+def test_our_determinism(referee):
+    """Piles of six cubes, each in a process of its own, twice: no bit differs after 1 s."""
+    for name in ("pybullet", "drake", "sapien", "dart"):
+        one, two = (referee.ask(Pile(run=k), name) for k in (1, 2))
+        referee.rule(f"{name} [m]", two, DIFFERENCE, at_most(0.0), apart(one, two))
 
 
 @claim(README, "PyBullet restores a state exact to the bit; so do MuJoCo and Drake")
