@@ -23,7 +23,7 @@ CLAIMS = {
     if hasattr(test, "words")
 }
 HEADS = ("claim", "who says what", "asked", "verdict", "numbers")
-SHOWN = 3
+SHOWN = 2
 """Parts of a claim in its row; those that decide come first."""
 
 

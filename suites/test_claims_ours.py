@@ -12,7 +12,7 @@ from pytest_simbench.suites.claimed import (
     Restored,
     apart,
 )
-from pytest_simbench.suites.referee import Drawn, claim, of_a_claim  # noqa: F401
+from pytest_simbench.suites.referee import DRAWS, Drawn, claim, of_a_claim  # noqa: F401
 
 from pytest_simbench.laws import LAWS
 from pytest_simbench.measure.verdicts import at_least, at_most
@@ -52,17 +52,17 @@ def test_our_tosses(referee, data_set):
         referee.rule(f"{name} [%]", found, DIFFERENCE, at_most(13.5), mean)
 
 
-def keeps(referee, simulator, *phenomena):
+def keeps(referee, simulator, *phenomena, draws=DRAWS):
     """Each law, its parameters drawn up to the held-out ones, within its tolerance."""
     for law in (law for law in LAWS if law.phenomenon in phenomena):
         for finer in STEPS:
-            found = referee.ask(Drawn(law, repetitions=20), simulator, finer=finer)
+            found = referee.ask(Drawn(law, repetitions=draws), simulator, finer=finer)
             referee.rule(f"{law.name} [tolerances]", found, "ratio", at_most(1.0))
 
 
 @claim(README, "SAPIEN keeps all 3 laws of grasping")
 def test_our_grasping(referee):
-    keeps(referee, "sapien", "grasping")
+    keeps(referee, "sapien", "grasping", draws=20)
 
 
 @claim(README, "SAPIEN keeps all 15 laws of friction and sliding")
