@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from datetime import date
 
-from pytest_simbench.suites import test_claims, test_claims_ours
+from pytest_simbench.suites import claims_ours, test_claims
 from pytest_simbench.suites.referee import verdict
 from tables import DATA, Line, table
 
@@ -18,8 +18,7 @@ COLUMNS = (
 )  # fmt: skip
 CLAIMS = {
     name.removeprefix("test_"): test
-    for suite in (test_claims, test_claims_ours)
-    for name, test in vars(suite).items()
+    for name, test in vars(test_claims).items()
     if hasattr(test, "words")
 }
 HEADS = ("claim", "who says what", "asked", "verdict", "numbers")
@@ -73,7 +72,7 @@ def _verdicts() -> str:
         first = sorted(parts, key=lambda k: [n["verdict"] != "FAIL" for n in parts[k]])
         told = [_numbers(part, parts[part]) for part in first[:SHOWN]]
         more = [f"and {len(first) - SHOWN} more"] if len(first) > SHOWN else []
-        limits = " ".join((test.__doc__ or test_claims_ours.keeps.__doc__ or "").split())
+        limits = " ".join((test.__doc__ or claims_ours.keeps.__doc__ or "").split())
         cells = (f"`{name}`", f"{test.by}: {test.words}", limits, f"**{found}**")
         rows.append([*cells, "; ".join(told + more)])
     for by, words, why in test_claims.NOT_HERE:

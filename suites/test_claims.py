@@ -1,7 +1,7 @@
-"""What the field says of simulators, asked again. Each claim is a test; ours: test_claims_ours.py.
+"""What the field says of simulators, and we of them (claims_ours.py), asked again: each is a test.
 
-    pytest suites/test_claims*.py                     # all: a quarter of an hour
-    pytest suites/test_claims*.py -k mujoco_rk4       # one
+    pytest suites/test_claims.py                      # all: a quarter of an hour
+    pytest suites/test_claims.py -k mujoco_rk4        # one
 
 A test fails where its claim does not hold; one whose claim cannot be decided passes and says so.
 How that is judged: `referee.py`. A docstring says what is measured, and the limit, fixed before it
@@ -348,3 +348,6 @@ def test_pybullet_stacks(referee):
     for profile in ("default", "tuned"):
         found = referee.ask(Stacking().study(), "pybullet", profile)
         referee.rule(f"{profile}: placed", found, "placed", at_most(0.47))
+
+
+from pytest_simbench.suites.claims_ours import *  # noqa: E402, F403

@@ -1,4 +1,5 @@
-"""What we say of simulators, and what was published on the real tosses: see test_claims.py."""
+"""What we say of simulators, and what was published on the real tosses; test_claims.py has these
+tests too."""
 
 from dataclasses import replace
 
@@ -12,7 +13,7 @@ from pytest_simbench.suites.claimed import (
     Restored,
     apart,
 )
-from pytest_simbench.suites.referee import DRAWS, Drawn, claim, of_a_claim  # noqa: F401
+from pytest_simbench.suites.referee import DRAWS, Drawn, claim
 
 from pytest_simbench.laws import LAWS
 from pytest_simbench.measure.verdicts import at_least, at_most
