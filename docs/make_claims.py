@@ -67,7 +67,7 @@ def _verdicts() -> str:
         parts: dict[str, list[Line]] = {}
         for line in known:
             if line["claim"] == name:
-                parts.setdefault(line["part"].strip(), []).append(line)
+                parts.setdefault(line["part"], []).append(line)
         found = verdict({k: [line["verdict"] for line in of] for k, of in parts.items()})
         first = sorted(parts, key=lambda k: [n["verdict"] != "FAIL" for n in parts[k]])
         told = [_numbers(part, parts[part]) for part in first[:SHOWN]]

@@ -34,7 +34,7 @@ MOVED = 1e-3
 class ShakenTower(Tower, name="shaken_tower"):
     """A tower whose cubes are not quite above each other."""
 
-    overhangs: tuple[float, ...] = (-MOVED,) * 4  # type: ignore[misc]
+    overhangs: tuple[float, ...] = (-MOVED,) * 4
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,10 @@ class ShakenLoad(HeavyOnTop, name="shaken_load"):
     """Three such cubes of 1 kg that carry a heavier one."""
 
     top: float = 100.0
-    overhangs: tuple[float, ...] = (-MOVED,) * 3  # type: ignore[misc]
+    overhangs: tuple[float, ...] = (-MOVED,) * 3
 
     @property
-    def masses(self) -> tuple[float, ...]:  # type: ignore[override]
+    def masses(self) -> tuple[float, ...]:
         return 1.0, 1.0, 1.0, self.top
 
 
@@ -59,7 +59,7 @@ LOADS = ShakenLoad(), ShakenLoad(top=50.0, overhangs=(MOVED,) * 3)
 class SpinGain(TumbleEnergy, name="spin_gain", quantity="gain of kinetic energy", unit="%"):
     """How far the energy of a body that tumbles rises above the least that it had."""
 
-    omega: Vector3 = (0.05, 6.0, 0.05)  # type: ignore[misc]
+    omega: Vector3 = (0.05, 6.0, 0.05)
 
     def read(self, seen: Watched) -> Reading:
         energy = np.square(self.spun(seen)) @ self.inertia
@@ -111,7 +111,7 @@ class Pile(Task):
 
     name: ClassVar[str] = "pile"
     study_timeout: ClassVar[float] = 300.0
-    repetitions: ClassVar[int] = 5  # type: ignore[misc]
+    repetitions: ClassVar[int] = 5
 
     cubes: int = 6
     beside: int = 0

@@ -43,6 +43,7 @@ DRAWS = 8
 """Of a law's parameters."""
 
 FAR = 1000.0
+"""How much worse than a world that holds is one that diverged."""
 
 
 def verdict(parts: Mapping[str, Iterable[str]]) -> str:
@@ -66,12 +67,12 @@ class Drawn(Task):
 
     law: Law
     other: Law | None = None
-    repetitions: int = DRAWS  # type: ignore[assignment]
+    repetitions: int = DRAWS
     study_timeout = Law.study_timeout
     shares_worker = True
 
     @property
-    def name(self) -> str:  # type: ignore[override]
+    def name(self) -> str:
         return self.law.name
 
     @property
@@ -145,9 +146,8 @@ class Referee:
             values = of.values(metric.name)
         found = interval(list(values or ()), metric, confidence(metric))
         judged = judge(claim, found)
-        if (
-            of.crashed and not metric.bounded and metric is not RATIO
-        ):  # what did not finish speaks for nobody
+        if of.crashed and not metric.bounded and metric is not RATIO:
+            # what did not finish speaks for nobody
             judged = Judgement(Verdict.NOT_JUDGED, claim, found)
         line = claim_of(self.asked[id(of)].case, of, metric, judged)
         line = replace(line, variant=f"{part}: {line.variant}", test=f"{line.test} {part}")
