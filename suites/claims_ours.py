@@ -26,11 +26,11 @@ README = OURS.format("README", "../README.md#which-simulator")
     "fitted to these tosses MuJoCo is off by 25.1 % of the edge, Bullet by 14.9, Drake by 13.5",
 )
 def test_real_tosses(referee, data_set):
-    """95 held-out tosses, profile `real`, our step and half: MuJoCo at least 20 %, Bullet and Drake
-    within 3 points."""
-    task = Tossing(data_set("cube_tosses"), most=95)
+    """Held-out tosses, profile `real`, our step, in MuJoCo half of it too: MuJoCo at least 20 %,
+    Bullet and Drake within 3 points."""
+    task = Tossing(data_set("cube_tosses"))
     for name, low, high in (("mujoco", 20, 30), ("pybullet", 11.9, 17.9), ("drake", 10.5, 16.5)):
-        for finer in STEPS:
+        for finer in STEPS if name == "mujoco" else (1,):
             found = referee.ask(task, name, "real", finer)
             referee.rule(f"{name} [%], least", found, "position_error", at_least(low))
             referee.rule(f"{name} [%], most", found, "position_error", at_most(high))
