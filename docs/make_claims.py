@@ -83,12 +83,13 @@ def _verdicts() -> str:
 def _numbers(part: str, of: list[Line]) -> str:
     """Of all ways in which a part was asked: their means, and the ends of their intervals."""
     means = sorted(float(line["mean"]) for line in of)
-    told = " to ".join(dict.fromkeys(f"{mean:.2g}" for mean in (means[0], means[-1])))
+    told = " to ".join(dict.fromkeys(f"{mean:.4g}" for mean in (means[0], means[-1])))
     low = min(float(line["low"] or line["mean"]) for line in of)
     high = max(float(line["high"] or line["mean"]) for line in of)
-    ends = f" [{low:.2g}, {high:.2g}]" if low < high else ""
+    ends = f" [{low:.3g}, {high:.3g}]" if low < high else ""
     kept = sum(line["verdict"] == "PASS" for line in of)
-    return f"{part} {told}{ends}" + (f" ({kept} of {len(of)} ways)" if kept < len(of) else "")
+    share = "" if kept == len(of) else f" ({kept} of {len(of)} ways)" if kept else " (misses)"
+    return f"{part} {told}{ends}{share}"
 
 
 def _versions() -> str:

@@ -18,7 +18,7 @@ from pytest_simbench.measure.verdicts import at_least, at_most
 from pytest_simbench.tasks import Throwing, Tossing
 
 OURS = "[our {}]({})"
-README = OURS.format("README", "../README.md#which-simulator")
+README = OURS.format("README", "index.md#which-simulator")
 
 
 @claim(

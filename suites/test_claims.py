@@ -1,6 +1,6 @@
 """What the field says of simulators, and we of them (claims_ours.py), asked again: each is a test.
 
-    pytest suites/test_claims.py                      # all: a quarter of an hour
+    pytest suites/test_claims.py                      # all: 20 minutes
     pytest suites/test_claims.py -k mujoco_rk4        # one
 
 A test fails where its claim does not hold; one whose claim cannot be decided passes and says so.
