@@ -45,24 +45,24 @@ def read(run: RunContents) -> bool:
             asked = (name, part, claim.simulator, way, str(claim.relation), f"{claim.threshold:g}")
             row = (*asked, claim.verdict, *numbers, str(claim.n), version, today)
             new.append(dict(zip(COLUMNS, row, strict=True)))
-    if not new:
-        return False
-    names = {line["claim"] for line in new}
-    kept = [line for line in lines() if line["claim"] not in names]
-    with FILE.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows([*kept, *new])
-    return True
+    if new:
+        names = {line["claim"] for line in new}
+        kept = [line for line in lines() if line["claim"] not in names]
+        with FILE.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows([*kept, *new])
+    return bool(new)
 
 
 def claims(what: str) -> str:
-    """One table: `verdicts` on claims, or `versions` of who was asked."""
-    return _versions() if what == "versions" else _verdicts()
-
-
-def _verdicts() -> str:
+    """One table: `verdicts` on claims, or `versions` of who was asked (releases: the parts)."""
     known, rows = lines(), []
+    if what == "versions":
+        asked = {
+            (n["simulator"], n["version"], n["date"]) for n in known if "==" not in n["simulator"]
+        }
+        return table(("simulator", "version", "asked on"), sorted(asked), 3)
     for name, test in CLAIMS.items():
         parts: dict[str, list[Line]] = {}
         for line in known:
@@ -90,9 +90,3 @@ def _numbers(part: str, of: list[Line]) -> str:
     kept = sum(line["verdict"] == "PASS" for line in of)
     share = "" if kept == len(of) else f" ({kept} of {len(of)} ways)" if kept else " (misses)"
     return f"{part} {told}{ends}{share}"
-
-
-def _versions() -> str:
-    """Of releases the parts tell."""
-    found = sorted({(n["simulator"], n["version"], n["date"]) for n in lines()})
-    return table(("simulator", "version", "asked on"), [f for f in found if "==" not in f[0]], 3)
