@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from itertools import groupby
 from pathlib import Path
 
+import make_claims
 import make_results
 import make_tasks
 import make_truth
@@ -51,6 +52,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "phenomena": make_truth.phenomena,
     "over_steps": make_truth.over_steps,
     "planted": planted,
+    "claims": make_claims.claims,
 }
 """By the first word of a mark, the others are arguments; beside those of `make_results`."""
 
@@ -69,11 +71,10 @@ def _made(words: str) -> str:
 
 def readme() -> str:
     """The README with its table."""
-    made = MARK.sub(
+    return MARK.sub(
         lambda mark: f"<!-- made: {mark[1]} -->\n\n{_made(mark[1])}\n\n<!-- end -->\n",
         README.read_text("utf-8"),
     )
-    return made
 
 
 def kept_pages() -> dict[str, str]:
@@ -109,7 +110,10 @@ def write_pages() -> None:
 def read(folders: Sequence[str], **published: str) -> None:
     """Run folders into the CSVs."""
     for folder in folders:
-        records = RunFolder(Path(folder)).read().records
+        run = RunFolder(Path(folder)).read()
+        if make_claims.read(run):
+            continue
+        records = run.records
         laws = make_truth.SWEEP if any(r.swept for r in records) else make_truth.TRUTH
         for kept in (laws, make_tasks.ARMS, make_tasks.PUSHING, *make_tasks.EXPERIMENTS.values()):
             kept.read(records)

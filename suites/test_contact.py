@@ -12,17 +12,11 @@ walls say.
 from typing import get_args
 
 import pytest
-from pytest_simbench.suites.named import skip_where_not_named
 
 from pytest_simbench.tasks import Carrying, Nesting, Pouring
 from pytest_simbench.tasks.carrying import Shape
 
 SHAPES = get_args(Shape)
-
-
-@pytest.fixture(autouse=True)
-def where_named(request):
-    skip_where_not_named(request)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
