@@ -79,6 +79,7 @@ def test_the_user_chooses(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyP
     )
     arguments = ("-p", "no:randomly", "-p", "no:cacheprovider")
     monkeypatch.delenv("CI", raising=False)
+    monkeypatch.delenv("PYTEST_ADDOPTS")  # it is Hypothesis' plugin that is asked
     chosen = pytester.runpytest_subprocess("--hypothesis-profile=sim-dev", *arguments)
     chosen.assert_outcomes(passed=2)
     pytester.runpytest_subprocess(*arguments).assert_outcomes(passed=2)
