@@ -13,7 +13,7 @@ from typing import get_args
 
 import pytest
 
-from pytest_simbench.tasks import Carrying, Nesting, Pouring
+from pytest_simbench.tasks import Carrying, Nesting, Pouring, Slipping
 from pytest_simbench.tasks.carrying import Shape
 
 SHAPES = get_args(Shape)
@@ -30,7 +30,7 @@ def test_holds(repeat, threshold, shape):
 
 
 def test_slips(repeat, threshold):
-    result = repeat(Carrying("cube", load=1.25))
+    result = repeat(Slipping())
     result.assert_crashed_at_most(threshold("crashed", 0.15))
     result.assert_at_most("held", threshold("held", 0.2))
 

@@ -147,8 +147,10 @@ def _label(
         keys = [k for k in every if len({text(other.get(k)) for other in known}) > 1]
         if ROBOT in keys:
             keys = [ROBOT, *(k for k in keys if k != ROBOT and not _follows(k, ROBOT, known))]
-        apart = len({tuple(text(other.get(k)) for k in keys) for other in known}) == len(same)
-        if not apart and key.parameters:
+        named = [k for k in keys if k != SCENE]
+        if _kinds(named, known) == _kinds(keys, known):
+            keys = named
+        if _kinds(keys, known) < len(same) and key.parameters:
             parts.append(f"[{key.parameters}]")
         mine = told(group)
         differences = [_difference(k, mine.get(k)) for k in keys]
@@ -161,6 +163,15 @@ MOST = 3
 
 ROBOT = "robot.name"
 """What tells robots apart; their scenes, sizes and files differ with it."""
+
+
+SCENE = "scene"
+"""A digest: it tells nobody anything where a parameter tells as much."""
+
+
+def _kinds(keys: Sequence[str], known: Sequence[Mapping[str, object]]) -> int:
+    """How many rows keys tell apart."""
+    return len({tuple(text(other.get(k)) for k in keys) for other in known})
 
 
 def _follows(key: str, chief: str, known: Sequence[Mapping[str, object]]) -> bool:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.arm_following import ArmFollowing, CorrectedArmFollowing
     from pytest_simbench.tasks.arm_pushing import ArmPushing
     from pytest_simbench.tasks.base import Jitter, Moment, Outcome, Task
-    from pytest_simbench.tasks.carrying import Carrying
+    from pytest_simbench.tasks.carrying import Carrying, Slipping
     from pytest_simbench.tasks.fitting import Fitting
     from pytest_simbench.tasks.goals import GoalTask, PickAndPlace, PushingToGoal, Reaching
     from pytest_simbench.tasks.holding import Holding
@@ -29,14 +29,14 @@ __all__ = [
     "ArmFollowing", "ArmPushing", "Carrying", "CorrectedArmFollowing", "CurvePushing", "Fitting",
     "GoalTask", "Holding", "Impacting", "Jitter", "LeaningTowers", "Log", "Moment", "Nesting",
     "Outcome", "PickAndPlace", "Pouring", "Pushing", "PushingToGoal", "Reaching", "Replaying",
-    "Settling", "Stacking", "Task", "Throwing", "Tossing", "rests_on",
+    "Settling", "Slipping", "Stacking", "Task", "Throwing", "Tossing", "rests_on",
 ]  # fmt: skip
 
 _MODULES = {
     "arm_following": ("ArmFollowing", "CorrectedArmFollowing"),
     "arm_pushing": ("ArmPushing",),
     "base": ("Jitter", "Moment", "Outcome", "Task"),
-    "carrying": ("Carrying",),
+    "carrying": ("Carrying", "Slipping"),
     "fitting": ("Fitting",),
     "goals": ("GoalTask", "PickAndPlace", "PushingToGoal", "Reaching"),
     "holding": ("Holding",),

@@ -30,7 +30,6 @@ from pytest_simbench.scene import (
     Capsule,
     ConvexMesh,
     Cylinder,
-    FloatArray,
     Pose,
     Robot,
     Scene,
@@ -41,6 +40,7 @@ from pytest_simbench.scene import (
 from pytest_simbench.tasks.arm import LostBody
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task, distance
 from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
+from pytest_simbench.tasks.resting import RESTLESS, rates, rest
 
 Shape = Literal["cube", "ball", "tube", "pill", "prism"]
 
@@ -56,13 +56,10 @@ WAY = 0.3
 SHAKES, FREQUENCY, ACCELERATION = 4, 2.0, 2.5
 """Swings up and back, how many in a second [1/s], and their largest acceleration [m/s^2]."""
 
-SAMPLING = 0.01
-"""Between samples of the motion [s]."""
-
-RESTING = 0.5
-"""The last seconds, over which it is measured how calmly it is held [s]."""
-
 PURPLE = (0.55, 0.35, 0.75, 1.0)
+
+
+HELD = Metric("held", "held", kind="yes_no", doc="it is still in the hand at the end")
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ class Carrying(Task):
 
     Attributes:
         shape: of the thing. All are 5 cm wide between the fingers and lie or stand as they rest.
-        load: its largest weight on the way, over what two pads hold, 2 mu N.
+        load: its largest weight on the way, over what two pads hold, 2 mu N; below 1.
         still: how long it is held still at the end [s].
         robot: that carries, with two parallel fingers; None: the Panda.
     """
@@ -93,34 +90,26 @@ class Carrying(Task):
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
-        held = Metric(
-            "held", "held", kind="yes_no", better="higher" if self.load < 1.0 else "lower",
-            doc="it is still in the hand at the end",
-        )  # fmt: skip
-        if self.load >= 1.0:
-            return (held,)
         turn = Metric(
             "turn", "turn", unit="deg", better="lower", least=0,
             doc="by which it turned in the hand from the grasp to the end of the shaking",
         )  # fmt: skip
         return (
-            held,
+            HELD,
             Metric("slip", "slip", unit="mm", better="lower", least=0,
                    doc="how far it moved in the hand from the grasp to the end of the shaking"),
+            # a ball turns freely about the line between its two points of contact
             *((turn,) if self.shape != "ball" else ()),
             Metric("creep", "creep", unit="mm/min", better="lower", least=0, resolution=0.1,
                    doc=f"how fast it moves in the hand while that is still, over {self.still:g} s"),
             Metric("restless", "restless", unit="mm/s", better="lower", least=0, resolution=0.1,
-                   doc=f"root mean square speed in the hand in the last {RESTING:g} s"),
+                   doc=f"root mean square speed in the hand in the last {RESTLESS:g} s"),
         )  # fmt: skip
 
     @property
     def references(self) -> Mapping[str, float]:  # type: ignore[override]
         """Of Coulomb friction."""
-        if self.load >= 1.0:
-            return {"held": 0.0}
-        still = dict.fromkeys([metric.name for metric in self.metrics], 0.0)
-        return {**still, "held": 1.0}
+        return {**dict.fromkeys([metric.name for metric in self.metrics], 0.0), "held": 1.0}
 
     @property
     def mass(self) -> float:
@@ -172,7 +161,6 @@ class Carrying(Task):
         hand = Manipulator(world, Randomness.of(seed).planner)
         looks: list[Pose] = []
         reasons: list[str] = []
-        calm = 0.0
         world.mark("start")
         try:
             with world.phase("pick"):
@@ -184,30 +172,27 @@ class Carrying(Task):
             with world.phase("shake"):
                 hand.follow(self.shaking(hand))
             looks.append(_in_hand(world, hand.model))
-            with world.phase("hold"):
-                world.wait(max(self.still - RESTING, RESTING))
-                rest = world.wait(RESTING, log_period=SAMPLING)
+            began, seen = world.time, rest(world, self.still, "hold")
             looks.append(_in_hand(world, hand.model))
             hand.check_held()
-            assert rest is not None  # a log was asked for
-            calm = _speed(rest, hand.model)
         except (PlanningError, LostBody) as error:
             reasons.append(str(error))
         world.mark("end")
         count(int(not reasons), 1)
-        if reasons or self.load >= 1.0:
-            return Outcome({"held": float(not reasons)}, reasons=tuple(reasons))
+        if reasons:
+            return Outcome({"held": 0.0}, reasons=tuple(reasons))
         grasped, shaken, end = looks
-        metrics: dict[str, float | None] = {
+        found: dict[str, float | None] = {
             "held": 1.0,
             "slip": 1000 * distance(grasped, shaken),
-            "creep": 1000 * distance(shaken, end) * 60.0 / self.still,
-            "restless": calm,
+            "turn": math.degrees(_turn(grasped, shaken)),
+            "creep": 1000 * distance(shaken, end) * 60.0 / (world.time - began),
+            "restless": _speed(seen, hand.model),
         }
-        if self.shape != "ball":  # it turns freely about the line between its points of contact
-            turned = (grasped.inverse() * shaken).quaternion[0]
-            metrics["turn"] = math.degrees(2 * math.acos(min(1.0, abs(turned))))
-        return Outcome(metrics, {"in_hand": [look.as_array().tolist() for look in looks]})
+        return Outcome(
+            {metric.name: found[metric.name] for metric in self.metrics},
+            {"in_hand": [look.as_array().tolist() for look in looks]},
+        )
 
     def shaking(self, hand: Manipulator) -> Trajectory:
         """Up and back with h (1 - cos) / 2, whose largest acceleration is `ACCELERATION`."""
@@ -222,15 +207,34 @@ class Carrying(Task):
             return hand.planner.set_points(timed, np.full(len(path), hand.fingers))
 
 
+@dataclass(frozen=True)
+class Slipping(Carrying):
+    """Carry what is too heavy: it slips out. A task of its own: who holds is right there, and wrong
+    here."""
+
+    name: ClassVar[str] = "slipping"
+    references: ClassVar[Mapping[str, float]] = {"held": 0.0}
+
+    load: float = 1.25
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        return (replace(HELD, better="lower"),)
+
+
 def _in_hand(world: World, model: RobotModel) -> Pose:
     """The thing's pose at the tool centre point, as the joints are."""
     return model.tool_pose(world.joints[0, : model.arm]).inverse() * world.pose("thing")
 
 
-def _speed(rest: Motion, model: RobotModel) -> float:
+def _turn(a: Pose, b: Pose) -> float:
+    """Angle between two attitudes [rad]."""
+    return 2 * math.acos(min(1.0, abs((a.inverse() * b).quaternion[0])))
+
+
+def _speed(seen: Motion, model: RobotModel) -> float:
     """Root mean square speed of the thing in the hand [mm/s]."""
-    tools = [model.tool_pose(joints[0, : model.arm]) for joints in rest.joints]
-    things = [Pose.from_array(bodies[0, :7]) for bodies in rest.bodies]
+    tools = [model.tool_pose(joints[0, : model.arm]) for joints in seen.joints]
+    things = [Pose.from_array(bodies[0, :7]) for bodies in seen.bodies]
     at = np.array([(a.inverse() * b).position for a, b in zip(tools, things, strict=True)])
-    speeds: FloatArray = np.diff(at, axis=0) / np.diff(rest.time)[:, None]
-    return 1000 * float(np.sqrt(np.mean(np.sum(speeds**2, axis=1))))
+    return 1000 * float(np.linalg.norm(rates(seen.time, at)))

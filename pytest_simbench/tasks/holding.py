@@ -13,13 +13,12 @@ from pytest_simbench.scene import FloatArray, Trajectory
 from pytest_simbench.tasks.base import Count, Outcome
 from pytest_simbench.tasks.on_scene import (
     FARTHEST,
-    LOG_PERIOD,
-    RESTLESS,
     OnJoints,
     places,
     started,
     ways,
 )
+from pytest_simbench.tasks.resting import LOG_PERIOD, RESTLESS, rates, rest
 
 
 @dataclass(frozen=True)
@@ -66,12 +65,10 @@ class Holding(OnJoints):
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         before, (targets, efforts) = world.joints[0], self.commands(seed)
         world.follow(Trajectory.holding(LOG_PERIOD, targets, efforts))
-        rest = self.rest(world, self.seconds, "hold")
+        seen = rest(world, self.seconds, "hold")
         gone = world.joints[0] - before
         metrics = self.by_kind("gone", np.abs(gone))
-        # From positions: the speeds that an engine tells may be others.
-        speeds = np.diff(rest.joints[:, 0], axis=0) / np.diff(rest.time)[:, None]
-        metrics |= self.by_kind("restless", np.sqrt(np.mean(speeds**2, axis=0)))
+        metrics |= self.by_kind("restless", rates(seen.time, seen.joints[:, 0]))
         bodies = places(world)
         moved = ways(started(world.scene), bodies)
         if moved:

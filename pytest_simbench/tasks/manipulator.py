@@ -52,7 +52,8 @@ class Manipulator(Arm):
         """
         seen = self.world.pose(name)
         body = self.world.scene.body(name).moved_to(seen)
-        widths = {grip.tool: grip.width for grip in grips(self.model.robot, body, self.scale)}
+        with self.world.stopwatch.measuring("plan"):
+            widths = {grip.tool: grip.width for grip in grips(self.model.robot, body, self.scale)}
         down, above = self._plan_choice([self._aside(tool) for tool in widths], ignored=(name,))
         self.go_to(above, speed=self.speeds.free)
         self.move_straight(down, speed=self.speeds.contact, ignored=(name,))

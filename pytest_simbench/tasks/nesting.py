@@ -15,9 +15,12 @@ from typing import ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
+from pytest_simbench.description.urdf import Link
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Compound, ConvexMesh, Pose, Scene, principal
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task
+from pytest_simbench.tasks.resting import RESTLESS, rates, rest
+from pytest_simbench.tasks.settling import tilted
 
 WALLS, LEAN = 8, math.radians(30.0)
 """Of a bowl, and how far they lean outwards from the vertical [rad]."""
@@ -32,9 +35,6 @@ GAP = 0.005
 
 STEP = THICK / math.sin(LEAN)
 """From one bowl to the next, nested [m]: 6 mm."""
-
-RESTING, SAMPLING = 0.5, 0.01
-"""The last seconds, over which it is measured how calmly they rest, and between samples [s]."""
 
 NESTED = 5e-4
 """A stack is nested whose bowls are off by no more than that each [m]."""
@@ -71,7 +71,7 @@ class Nesting(Task):
             Metric("tilt", "tilt", unit="deg", better="lower", least=0,
                    doc="of the bowl that leans most"),
             Metric("restless", "restless", unit="mm/s", better="lower", least=0, resolution=0.1,
-                   doc=f"root mean square speed in the last {RESTING:g} s, of the fastest bowl"),
+                   doc=f"root mean square speed in the last {RESTLESS:g} s, of the fastest bowl"),
         )  # fmt: skip
 
     def smoke(self) -> Nesting:
@@ -88,23 +88,18 @@ class Nesting(Task):
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         names = [f"bowl_{k + 1}" for k in range(self.bowls)]
         world.mark("start")
-        with world.phase("fall"):
-            world.wait(max(self.settle - RESTING, RESTING))
+        seen = rest(world, self.settle, "fall")
         world.mark("end")
-        with world.phase("rest"):
-            rest = world.wait(RESTING, log_period=SAMPLING)
-        assert rest is not None  # a log was asked for
         poses = [world.pose(name) for name in names]
         steps = np.diff([pose.position[2] for pose in poses])
         off = np.abs(steps - STEP)
         count(int((off < NESTED).sum()) + 1, self.bowls)
-        moved = np.diff(rest.bodies[:, :, :3], axis=0) / np.diff(rest.time)[:, None, None]
-        speeds = np.sqrt(np.mean(np.sum(moved**2, axis=2), axis=0))
-        tilts = [math.acos(min(1.0, float(pose.rotation()[2, 2]))) for pose in poses]
+        speeds = np.linalg.norm(rates(seen.time, seen.bodies[:, :, :3]), axis=1)
+        tilts = [tilted(Pose(), pose) for pose in poses]
         return Outcome(
             {
                 "height_error": 1000 * float(off.max(initial=0.0)),
-                "tilt": math.degrees(max(tilts)),
+                "tilt": max(tilts),
                 "restless": 1000 * float(speeds.max()),
             },
             {"steps": steps.tolist()},
@@ -126,19 +121,13 @@ def a_bowl() -> tuple[Compound, float]:
         ]
     parts = {name: principal(corners) for name, corners in points.items()}
     shapes = [ConvexMesh(name, *part, 0.0, FRICTION) for name, part in parts.items()]
-    shares = np.array([shape.volume for shape in shapes])
-    shares = shares / shares.sum()
-    centres = np.array([shape.pose.position for shape in shapes])
-    middle = shares @ centres
-    inertia = np.zeros(3)
-    for shape, share, centre in zip(shapes, shares, centres - middle, strict=True):
-        turned = shape.pose.rotation()
-        own = turned @ np.diag(shape.changed(mass=MASS * share).even_inertia()) @ turned.T
-        inertia += np.diag(
-            own + MASS * share * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-        )
-    moments = tuple(map(float, inertia))
-    down = -float(middle[2])
+    whole = Link("bowl")
+    share = MASS / sum(shape.volume for shape in shapes)
+    for shape in shapes:
+        part = shape.changed(mass=share * shape.volume)
+        whole.absorb(Link("", part.mass, inertia=np.diag(part.even_inertia())), part.pose)
+    moments = tuple(map(float, np.diag(whole.inertia)))
+    down = -float(whole.centre[2])
     lowered = tuple(shape.moved_to(shape.pose.translated(z=down)) for shape in shapes)
     bowl = Compound(
         "bowl", lowered, Pose(), MASS, FRICTION, CHINA, moments=moments  # type: ignore[arg-type]

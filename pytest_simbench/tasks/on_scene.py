@@ -12,18 +12,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.world import World
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.records.metrics import RESOLUTIONS, Metric
 from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Robot, Scene, SceneError, Start
 from pytest_simbench.tasks.base import Jitter, Task, distance
-
-RESTLESS = 0.5
-"""The last seconds over which it is measured how calmly things rest [s]."""
-
-LOG_PERIOD = 0.01
-"""Between two samples of a motion [s]."""
 
 
 @dataclass(frozen=True)
@@ -57,15 +50,6 @@ class OnScene(Task):
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         start = self.start(seed)
         return self.world if start is None else self.world.at_start(start)
-
-    def rest(self, world: World, seconds: float, phase: str) -> Motion:
-        """Wait for so long [s] and return the motion of the last `RESTLESS`."""
-        with world.phase(phase):
-            world.wait(max(seconds - RESTLESS, RESTLESS))
-        with world.phase("rest"):
-            rest = world.wait(RESTLESS, log_period=LOG_PERIOD)
-        assert rest is not None  # a log was asked for
-        return rest
 
 
 @dataclass(frozen=True)

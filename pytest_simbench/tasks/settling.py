@@ -21,13 +21,12 @@ from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from pytest_simbench.tasks.on_scene import (
     FARTHEST,
-    LOG_PERIOD,
-    RESTLESS,
     OnScene,
     places,
     started,
     ways,
 )
+from pytest_simbench.tasks.resting import LOG_PERIOD, RESTLESS
 
 LOOKS = 10
 """So often the forces of contacts are asked for while the bodies rest."""

@@ -125,6 +125,17 @@ def test_a_label_lists_three_differences() -> None:
     assert labels(a=2, b=2, c=2, d=2) == ["a=1 b=1 c=1 ...", "a=2 b=2 c=2 ..."]
 
 
+def test_a_scene_is_told_where_nothing_else_tells_as_much() -> None:
+    own = record(1, scene="0", settings={"task.shape": "ball"})
+    moved = replace(own, scene="1")
+    cube = replace(own, scene="2", settings={"task.shape": "cube"})
+    assert [row.label for row in series([own, cube])] == ["task.shape=ball", "task.shape=cube"]
+    assert [row.label for row in series([own, moved])] == ["scene=0", "scene=1"]
+    assert [row.label for row in series([own, moved, cube])] == [
+        "task.shape=ball scene=0", "task.shape=ball scene=1", "task.shape=cube scene=2",
+    ]  # fmt: skip
+
+
 def test_robots_are_told_by_name_alone_and_what_else_differs_beside() -> None:
     own = record(1, scene="0", settings={"timestep": 0.002})
     small = {"robot": {"name": "so101", "digest": "1"}, "scene": "1"}

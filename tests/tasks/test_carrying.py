@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -13,7 +12,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import STANDARD_GRAVITY
-from pytest_simbench.tasks import Carrying, Jitter
+from pytest_simbench.tasks import Carrying, Jitter, Slipping
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.carrying import ACCELERATION, FRICTION, Shape
 from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, slip
@@ -79,8 +78,13 @@ def test_who_cannot_carry_it_is_told_beforehand() -> None:
     assert TASK.on(find("xarm7")).problem() is None
 
 
-@pytest.mark.parametrize(("load", "held"), [(0.8, 1.0), (1.25, 0.0)])
-def test_on_an_engine(case: Case, load: float, held: float) -> None:
-    record, error = Repetition(Experiment(case, replace(TASK, load=load)), 1).run()
+@pytest.mark.parametrize("task", [TASK, Slipping(still=1.0)], ids=lambda task: task.name)
+def test_on_an_engine(case: Case, task: Carrying) -> None:
+    record, error = Repetition(Experiment(case, task), 1).run()
     assert error is None
-    assert record.metrics["held"] == held
+    assert record.metrics["held"] == task.references["held"]
+
+
+def test_who_holds_what_is_too_heavy_is_told_no_more() -> None:
+    outcome, _ = carried(task=Slipping(still=1.0))
+    assert outcome.metrics == {"held": 1.0}

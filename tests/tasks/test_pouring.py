@@ -13,7 +13,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.scene import Pose
 from pytest_simbench.tasks import Jitter, Pouring
-from pytest_simbench.tasks.pouring import RADIUS, TRAY
+from pytest_simbench.tasks.pouring import RADIUS, SPACING, TRAY
 
 
 @pytest.mark.parametrize("balls", [1, 6, 10, 30, 100])
@@ -25,7 +25,7 @@ def test_all_begin_in_the_cup_apart_from_each_other(balls: int) -> None:
     assert task.within(task.cup().pose, centres).all()
     gaps = np.linalg.norm(centres[:, None] - centres[None], axis=2) + np.eye(balls)
     assert gaps.min() >= 2 * RADIUS or balls == 1
-    wall = task.side * 0.0165 / 2 + 0.001
+    wall = task.side * SPACING / 2 + 0.001
     assert np.abs(centres[:, :2]).max() + RADIUS < wall
 
 
