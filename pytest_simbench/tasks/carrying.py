@@ -40,7 +40,7 @@ from pytest_simbench.scene import (
 from pytest_simbench.tasks.arm import LostBody
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task, distance
 from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
-from pytest_simbench.tasks.resting import RESTLESS, rates, rest
+from pytest_simbench.tasks.resting import FORCE_JITTER, RESTLESS, calm, rates, spread
 
 Shape = Literal["cube", "ball", "tube", "pill", "prism"]
 
@@ -104,6 +104,7 @@ class Carrying(Task):
                    doc=f"how fast it moves in the hand while that is still, over {self.still:g} s"),
             Metric("restless", "restless", unit="mm/s", better="lower", least=0, resolution=0.1,
                    doc=f"root mean square speed in the hand in the last {RESTLESS:g} s"),
+            FORCE_JITTER,
         )  # fmt: skip
 
     @property
@@ -172,7 +173,10 @@ class Carrying(Task):
             with world.phase("shake"):
                 hand.follow(self.shaking(hand))
             looks.append(_in_hand(world, hand.model))
-            began, seen = world.time, rest(world, self.still, "hold")
+            began = world.time
+            with world.phase("hold"):
+                world.wait(max(self.still - RESTLESS, RESTLESS))
+            seen, forces = calm(world)
             looks.append(_in_hand(world, hand.model))
             hand.check_held()
         except (PlanningError, LostBody) as error:
@@ -188,6 +192,7 @@ class Carrying(Task):
             "turn": math.degrees(_turn(grasped, shaken)),
             "creep": 1000 * distance(shaken, end) * 60.0 / (world.time - began),
             "restless": _speed(seen, hand.model),
+            "force_jitter": spread(world.scene, forces),
         }
         return Outcome(
             {metric.name: found[metric.name] for metric in self.metrics},

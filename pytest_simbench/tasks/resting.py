@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
+from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.world import World
-from pytest_simbench.scene import FloatArray
+from pytest_simbench.ground.errors import NotSupportedError
+from pytest_simbench.records.metrics import Metric
+from pytest_simbench.scene import FloatArray, Scene
 
 RESTLESS = 0.5
 """The last seconds over which it is measured how calmly things rest [s]."""
 
 LOG_PERIOD = 0.01
 """Between two samples of a motion [s]."""
+
+LOOKS = 10
+"""So often the forces of contacts are asked for while things rest."""
+
+FORCE_JITTER = Metric(
+    "force_jitter", "restless forces", unit="%", least=0, better="lower",
+    doc=f"spread of the forces of contacts over {LOOKS} looks in the last {RESTLESS:g} s, of the "
+        "weight of all free bodies; of simulators that tell them",
+)  # fmt: skip
+
+Forces = Mapping[tuple[str, str], FloatArray]
+"""As `World.contact_forces`."""
 
 
 def rest(world: World, seconds: float, phase: str) -> Motion:
@@ -23,6 +40,39 @@ def rest(world: World, seconds: float, phase: str) -> Motion:
         seen = world.wait(RESTLESS, log_period=LOG_PERIOD)
     assert seen is not None  # a log was asked for
     return seen
+
+
+def calm(world: World) -> tuple[Motion, list[Forces]]:
+    """The motion of `RESTLESS`, and the forces of contacts now and then in it; none where the
+    simulator does not tell them of this scene."""
+    parts: list[Motion] = []
+    forces: list[Forces] = []
+    began, told = world.time, True
+    with world.phase("rest"):
+        for k in range(1, LOOKS + 1):
+            until = began + k * RESTLESS / LOOKS
+            part = world.wait(until - world.time, log_period=LOG_PERIOD)
+            assert part is not None  # a log was asked for
+            parts.append(part)
+            try:
+                forces += [world.contact_forces()] if told else []
+            except EngineFailed as error:
+                told = False
+                if error.remote != NotSupportedError.__name__:
+                    raise
+    return Motion.joined(parts), forces
+
+
+def spread(scene: Scene, forces: Sequence[Forces]) -> float | None:
+    """Of the forces of all pairs over several looks, of the free bodies' weight [%]; None without
+    looks or weight."""
+    weight = sum(body.mass for body in scene.free_bodies) * float(np.linalg.norm(scene.gravity))
+    if not forces or not weight:
+        return None
+    pairs = sorted({pair for found in forces for pair in found if pair[0] < pair[1]})
+    rows = [[found[p][:3] if p in found else np.zeros(3) for p in pairs] for found in forces]
+    each = np.array(rows).reshape(len(forces), -1)
+    return 100 * float(np.sqrt(each.var(axis=0).sum())) / weight
 
 
 def rates(time: FloatArray, values: FloatArray) -> FloatArray:

@@ -8,12 +8,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.world import World
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.urdf import PreparedRobot
-from pytest_simbench.ground.errors import NotSupportedError
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Body, FloatArray, Pose, Scene, SceneError
 from pytest_simbench.scene.overlap import rotations
@@ -26,13 +24,7 @@ from pytest_simbench.tasks.on_scene import (
     started,
     ways,
 )
-from pytest_simbench.tasks.resting import LOG_PERIOD, RESTLESS
-
-LOOKS = 10
-"""So often the forces of contacts are asked for while the bodies rest."""
-
-Forces = Mapping[tuple[str, str], FloatArray]
-"""As `World.contact_forces`."""
+from pytest_simbench.tasks.resting import FORCE_JITTER, RESTLESS, calm, spread
 
 
 @dataclass(frozen=True)
@@ -113,9 +105,7 @@ class Settling(OnScene):
                    doc=f"root mean square speed of the bodies in the last {RESTLESS:g} s"),
             Metric("energy", "restless energy", unit="uJ", least=0, better="lower",
                    doc=f"mean kinetic energy of the bodies in the last {RESTLESS:g} s"),
-            Metric("force_jitter", "restless forces", unit="%", least=0, better="lower",
-                   doc=f"spread of the forces of contacts over {LOOKS} looks in the last "
-                       f"{RESTLESS:g} s, of the bodies' weight; of simulators that tell them"),
+            FORCE_JITTER,
         )  # fmt: skip
 
     def smoke(self) -> Settling:
@@ -140,7 +130,7 @@ class Settling(OnScene):
         scene = world.scene
         with world.phase("settle"):
             world.wait(max(self.seconds - RESTLESS, RESTLESS))
-        rest, forces = _rest(world)
+        rest, forces = calm(world)
         prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         before = started(scene) | _links(prepared, None)
         bodies = places(world)
@@ -166,27 +156,6 @@ class Settling(OnScene):
         return Outcome(metrics, details, reasons=tuple(f"not: {text}" for text in failed))
 
 
-def _rest(world: World) -> tuple[Motion, list[Forces]]:
-    """The last half second, and the forces of contacts now and then in it; none where the
-    simulator does not tell them of this scene."""
-    parts: list[Motion] = []
-    forces: list[Forces] = []
-    began, told = world.time, True
-    with world.phase("rest"):
-        for k in range(1, LOOKS + 1):
-            until = began + k * RESTLESS / LOOKS
-            part = world.wait(until - world.time, log_period=LOG_PERIOD)
-            assert part is not None  # a log was asked for
-            parts.append(part)
-            try:
-                forces += [world.contact_forces()] if told else []
-            except EngineFailed as error:
-                told = False
-                if error.remote != NotSupportedError.__name__:
-                    raise
-    return Motion.joined(parts), forces
-
-
 def kinetic_energy(scene: Scene, states: FloatArray) -> float:
     """Mean over the time of that of all free bodies [J]; states as of `Motion.bodies`."""
     masses = np.array([body.mass for body in scene.free_bodies])
@@ -195,18 +164,6 @@ def kinetic_energy(scene: Scene, states: FloatArray) -> float:
     spins = np.einsum("tnij,tni->tnj", turns, states[..., 10:13])  # in the bodies' own axes
     moving = masses * np.sum(states[..., 7:10] ** 2, axis=2)
     return float(np.mean(np.sum(moving + np.sum(moments * spins**2, axis=2), axis=1)) / 2)
-
-
-def spread(scene: Scene, forces: Sequence[Forces]) -> float | None:
-    """Of the forces of all pairs over several looks, of the free bodies' weight [%]; None without
-    looks or weight."""
-    weight = sum(body.mass for body in scene.free_bodies) * float(np.linalg.norm(scene.gravity))
-    if not forces or not weight:
-        return None
-    pairs = sorted({pair for found in forces for pair in found if pair[0] < pair[1]})
-    rows = [[found[p][:3] if p in found else np.zeros(3) for p in pairs] for found in forces]
-    each = np.array(rows).reshape(len(forces), -1)
-    return 100 * float(np.sqrt(each.var(axis=0).sum())) / weight
 
 
 def _links(prepared: PreparedRobot | None, positions: FloatArray | None) -> dict[str, Pose]:

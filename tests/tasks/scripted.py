@@ -125,6 +125,9 @@ class ScriptedProcess:
 
     def do_read_again(self) -> None: ...
 
+    def do_contact_forces(self) -> list[Any]:
+        return []
+
     def do_stats(self) -> dict[str, Any]:
         return {"stepping": {"wall": 0.0, "simulated": self.time}, "peak_rss_mb": None}
 

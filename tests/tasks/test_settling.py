@@ -15,7 +15,8 @@ from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.scene import Box, Compound, Pose, Scene, SceneError, Start
 from pytest_simbench.tasks import Jitter, Settling, rests_on
-from pytest_simbench.tasks.settling import deepest, kinetic_energy, spread, tilted
+from pytest_simbench.tasks.resting import spread
+from pytest_simbench.tasks.settling import deepest, kinetic_energy, tilted
 from tests.conftest import case_of
 
 NONE = Jitter(0.0, 0.0)
