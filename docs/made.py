@@ -22,6 +22,7 @@ from itertools import groupby
 from pathlib import Path
 
 import make_claims
+import make_options
 import make_results
 import make_tasks
 import make_truth
@@ -53,6 +54,11 @@ TABLES: dict[str, Callable[..., str]] = {
     "over_steps": make_truth.over_steps,
     "planted": planted,
     "claims": make_claims.claims,
+    "options": make_options.options,
+    "commands": make_options.commands,
+    "marks": make_options.marks,
+    "fixtures": make_options.fixture_table,
+    "known_failures": make_options.known_failures,
 }
 """By the first word of a mark, the others are arguments; beside those of `make_results`."""
 

@@ -1,20 +1,19 @@
-"""Writes docs/options.md: every option, mark and fixture, from where the plugin has them.
-
-python docs/make_options.py
-"""
+"""Tables of every option, command, mark and fixture, and of what the kit is known to find."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Iterable, Sequence
+
+from tables import DOCS, NAMES, table
 
 from pytest_simbench.cli.main import COMMANDS
 from pytest_simbench.plugin import fixtures, repeatability
 from pytest_simbench.plugin.hooks import MARKS
 from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS, Option
+from pytest_simbench.testing.kit import read_expected_failures
 
-PAGE = Path(__file__).with_name("options.md")
+FAILURES = DOCS.parent / "tests" / "sims" / "expected_failures.txt"
 
 INTERNAL = (
     "sim_case",
@@ -27,60 +26,31 @@ INTERNAL = (
 )
 """Fixtures that tests do not ask for by name."""
 
-TEMPLATE = """\
-# Options, marks and fixtures
 
-The script `docs/make_options.py` writes this page. A test checks that it is up to date.
-
-## Options
-
-{options}
-
-Another plugin or a conftest may have a short name, `--gui` for instance. Then the name is theirs.
-The name under *sure* works in any case. The test run says so.
-
-`pytest --help` leaves out the options with *rare*.
-
-Each option has a twin in the ini file. Its name has underscores: `sim_jobs = 2`, `reps = 40`.
-Options with *no ini* concern a single run and have no twin. The command line wins over the ini
-file. The plugin checks all values before the run begins. A wrong value ends the run in one
-sentence.
-
-A comma separates several values (`--sim mujoco,pybullet`). A value of `--sim-python` or
-`--sim-spec` may hold a comma. Repeat these options instead.
-
-## What runs and exits
-
-The command `simbench` does it. `simbench COMMAND --help` says what a command takes. For one release
-the options of 0.1 still work. They call the command and name it.
-
-{commands}
-
-## Marks
-
-{marks}
-
-A mark takes several names: `@pytest.mark.only_sim("mujoco", "drake")`.
-
-## Fixtures
-
-{fixtures}
-
-Another plugin may have a fixture of the same name. Then the name is theirs. A conftest gives ours
-another name with an import:
-`from pytest_simbench.plugin.fixtures import output_path as run_folder`.
-Without pytest-benchmark (`-p no:benchmark`) all works but its rounds.
-"""
+def options() -> str:
+    return words(("option", "sure", "default", "meaning"), map(option_row, OPTIONS))
 
 
-def page() -> str:
-    """The page as it should be."""
-    return TEMPLATE.format(
-        options=table(("option", "sure", "default", "meaning"), map(option_row, OPTIONS)),
-        commands=table(("command", "meaning", "option of 0.1"), command_rows(), code=1),
-        marks=table(("mark", "meaning"), (mark.split(": ", 1) for mark in MARKS), code=1),
-        fixtures=table(("fixture", "lives for", "meaning"), fixture_rows()),
-    )
+def commands() -> str:
+    return words(("command", "meaning", "option of 0.1"), command_rows(), code=1)
+
+
+def marks() -> str:
+    return words(("mark", "meaning"), (mark.split(": ", 1) for mark in MARKS), code=1)
+
+
+def fixture_table() -> str:
+    return words(("fixture", "lives for", "meaning"), fixture_rows())
+
+
+def known_failures() -> str:
+    """Checks of the kit that shipped engines fail, sorted by law and engine."""
+    rows = []
+    for test, reason in read_expected_failures(FAILURES).items():
+        name, _, *robot, law = test.split("-")
+        engine = ", ".join([NAMES[name], *("other robots" if r == "*" else r for r in robot)])
+        rows.append((law, engine, reason))
+    return words(("law", "engine", "what was found"), sorted(rows), code=1)
 
 
 def option_row(option: Option) -> tuple[str, str, str, str]:
@@ -109,15 +79,8 @@ def fixture_rows() -> Iterable[tuple[str, str, str]]:
             yield f"`{name}`", lives, (thing.__doc__ or "").split("\n\n")[0]
 
 
-def table(headings: Iterable[str], rows: Iterable[Iterable[str]], code: int = 0) -> str:
-    """A Markdown table; the first `code` cells of each row are code."""
-    lines = [list(headings)]
-    lines.append(["---"] * len(lines[0]))
-    for row in rows:
-        cells = [" ".join(cell.split()).replace("|", "\\|") for cell in row]
-        lines.append([f"`{cell}`" if i < code else cell for i, cell in enumerate(cells)])
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page(), "utf-8")
+def words(headings: Sequence[str], rows: Iterable[Iterable[str]], code: int = 0) -> str:
+    """A table of words; the first `code` cells of each row are code."""
+    cells = ([" ".join(cell.split()).replace("|", "\\|") for cell in row] for row in rows)
+    told = ([f"`{c}`" if k < code else c for k, c in enumerate(row)] for row in cells)
+    return table(headings, told, len(headings))

@@ -1,6 +1,5 @@
 """The public conformance kit on every registered simulator, at its tuned settings; the laws of
-robots with others than the Panda: one with a parallel hand, and one with a jaw; and the docs' table
-of laws that engines break.
+robots with others than the Panda: one with a parallel hand, and one with a jaw.
 
 All robots in all engines are measured by hand: docs/extending/robots.md has the table.
 """
@@ -20,7 +19,6 @@ from pytest_simbench.testing.kit import Kit, read_expected_failures
 
 FILE = Path(__file__).with_name("expected_failures.txt")
 EXPECTED = read_expected_failures(FILE)
-PAGE = Path(__file__).parents[2] / "docs" / "extending" / "known_failures.md"
 
 
 @pytest.fixture
@@ -53,22 +51,3 @@ TESTS = [
 @pytest.mark.parametrize("check", [pytest.param(test, id=test.id) for test in TESTS])
 def test_other_robots(check: ConformanceTest) -> None:
     check()
-
-
-OTHERS = {"*": "other robots"}
-"""Than the Panda, of whom a line without a robot is."""
-
-
-def table() -> str:
-    """The table as Markdown, sorted by law and engine."""
-    rows = []
-    for test, reason in EXPECTED.items():
-        name, profile, *robot, law = test.split("-")
-        assert (profile, law in CHECKS) == ("tuned", True)
-        title = ", ".join([adapter(name).info.title, *(OTHERS.get(r, r) for r in robot)])
-        rows.append(f"| `{law}` | {title} | {reason} |")
-    return "\n".join(["| law | engine | what was found |", "|---|---|---|", *sorted(rows)])
-
-
-def test_the_table_of_the_docs() -> None:
-    assert PAGE.read_text("utf-8").endswith(f"\n\n{table()}\n"), f"write {table()}"
