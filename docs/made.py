@@ -22,6 +22,7 @@ from itertools import groupby
 from pathlib import Path
 
 import make_claims
+import make_contact
 import make_options
 import make_results
 import make_tasks
@@ -54,6 +55,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "over_steps": make_truth.over_steps,
     "planted": planted,
     "claims": make_claims.claims,
+    "contact": make_contact.contact,
     "options": make_options.options,
     "commands": make_options.commands,
     "marks": make_options.marks,
@@ -121,7 +123,7 @@ def read(folders: Sequence[str], **published: str) -> None:
             continue
         records = run.records
         laws = make_truth.SWEEP if any(r.swept for r in records) else make_truth.TRUTH
-        for kept in (laws, make_tasks.ARMS, make_tasks.PUSHING, *make_tasks.EXPERIMENTS.values()):
+        for kept in (laws, make_contact.CONTACT, *make_tasks.KEPT):
             kept.read(records)
         for kept in PUBLISHED.values() if published else ():
             kept.read(records, **published)

@@ -97,6 +97,7 @@ EXPERIMENTS = {
     )
     for task, metrics in REAL.items()
 }
+KEPT = (ARMS, PUSHING, *EXPERIMENTS.values())
 
 
 def arms(task: str) -> str:

@@ -1,0 +1,61 @@
+"""Tables of the contact tasks, from docs/data/contact.csv."""
+
+from __future__ import annotations
+
+from statistics import fmean
+
+from tables import NAMES, Kept, Line, numbers, table
+
+from pytest_simbench.records.metrics import Metric, significant
+from pytest_simbench.records.record import Record
+from pytest_simbench.tasks import Carrying, Nesting, Pouring, Slipping
+
+TASKS = {task.name: task for task in (Carrying(), Slipping(), Pouring(), Nesting())}
+CASES = {"carrying": "shape", "slipping": "shape", "pouring": "balls", "nesting": "bowls"}
+"""The parameter by which the repetitions of a task differ."""
+
+METRICS = {metric.name: metric for task in TASKS.values() for metric in task.metrics}
+COSTS = ("cpu_cost", "ram_peak")
+
+
+def _told(record: Record) -> dict[str, object] | None:
+    if record.task not in TASKS or record.robot.get("name", "panda") != "panda":
+        return None
+    case = record.settings[f"task.{CASES[record.task]}"]
+    return {"case": str(case), **record.metrics, **{name: record.cost(name) for name in COSTS}}
+
+
+CONTACT = Kept(
+    "contact",
+    ("task", "case", "profile", "simulator", "seed"),
+    ("task", "case", "profile", "simulator", "version", "seed", "status", *METRICS, *COSTS),
+    _told,
+)
+
+
+def contact(task: str, profile: str) -> str:
+    """A row for each simulator; in a cell the means of all cases. A crashed repetition counts where
+    yes or no is counted."""
+    lines = CONTACT.lines(task=task, profile=profile)
+    cases = list(dict.fromkeys(line["case"] for line in lines))
+    metrics = [m for m in TASKS[task].metrics if any(line[m.name] for line in lines)]
+    rows = []
+    for simulator, name in NAMES.items():
+        of = [line for line in lines if line["simulator"] == simulator]
+        if of:
+            each = [[line for line in of if line["case"] == case] for case in cases]
+            crashed = sum(line["status"] == "failed" for line in of)
+            cost = fmean(numbers(of, "cpu_cost") or [0.0])
+            cells = [_cell(each, metric) for metric in metrics]
+            rows.append([name, f"{crashed} of {len(of)}", *cells, significant(cost)])
+    heads = [f"{metric.title} {metric.unit}".strip() for metric in metrics]
+    told = f"In a cell: {' / '.join(cases)}.\n\n" if len(cases) > 1 else ""
+    return told + table(("simulator", "crashed", *heads, "CPU s per s"), rows)
+
+
+def _cell(each: list[list[Line]], metric: Metric) -> str:
+    if metric.kind == "yes_no":
+        all_of = [line for lines in each for line in lines]
+        return f"{sum(numbers(all_of, metric.name)):g} of {len(all_of)}"
+    means = [fmean(found) if (found := numbers(lines, metric.name)) else None for lines in each]
+    return " / ".join("-" if mean is None else significant(round(mean, 3), 2) for mean in means)
