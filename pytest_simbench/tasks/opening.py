@@ -42,14 +42,15 @@ from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
 PLACE = (0.55, 0.0, 0.25)
 """Of the handle's middle, the drawer shut [m]. It opens towards the robot, along minus x."""
 
-BAR = (0.02, 0.12, 0.02)
-"""Edges of the handle, level and square [m]."""
+BAR = (0.05, 0.12, 0.02)
+"""Edges of the handle, level [m]. As wide as the study's cubes: around these the fingers press
+with their whole squeeze. Their drives are springs, and press less around what is thinner."""
 
 POSTS = ((0.065, 0.015, 0.015), 0.0525)
 """That hold it: their edges, and how far aside they are [m]. Open fingers fit between it and the
 drawer."""
 
-BOX, BEHIND, BELOW = (0.3, 0.3, 0.14), 0.075, 0.01
+BOX, BEHIND, BELOW = (0.3, 0.3, 0.14), 0.09, 0.01
 """Edges of the drawer, how far behind the handle's middle its front is, and how far above that its
 top [m]: the palm stands higher."""
 
