@@ -54,6 +54,7 @@ def with_thing(scene: Scene, thing: Robot) -> Scene:
     path = keep(ET.tostring(urdf, encoding="unicode"), {**kept["meshes"], **other["meshes"]})
     both = replace(
         arm,
+        name=f"{arm.name}_and_{thing.name}",
         urdf=str(path),
         packages={},
         joints=(*arm.joints, *thing.joints),

@@ -16,6 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.world import World
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.robot_files import keep
@@ -27,6 +28,7 @@ from pytest_simbench.description.urdf import (
     write_joint,
     write_link,
 )
+from pytest_simbench.ground.errors import NotSupportedError
 from pytest_simbench.motion.beside import with_thing
 from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.grips import grips
@@ -196,7 +198,8 @@ class Opening(Task):
             reasons = (str(error),)
         world.mark("end")
         count(int(found["opened"] or 0.0), 1)
-        return Outcome(found, {"pulls": pulls}, reasons=reasons)
+        kept = [pull for pull in pulls if np.isfinite(pull)]
+        return Outcome(found, {"pulls": kept}, reasons=reasons)
 
     def _push(self, world: World, share: float, seconds: float) -> float:
         """Way of the drawer while its motor pushes with a share of the friction [m]."""
@@ -237,14 +240,14 @@ class Opening(Task):
             up = hand.tool.translated(z=hand.approach)
             hand.move_straight(up, speed=hand.speeds.contact, ignored=(DRAWER,))
             world.wait(self.rest)
+        way, told = opened - shut, bool(np.isfinite(pulls).all())
         work = float(np.trapezoid(pulls, ways))
         smooth = np.convolve(pulls, np.full(SMOOTHED, 1 / SMOOTHED), "valid")
-        way = opened - shut
         return {
             "opened": float(abs(way - self.way) < WITHIN),
             "slip": 1000 * abs(reached - way),
-            "work": work / (self.friction * way) if way > WITHIN else None,
-            "peak": float(smooth.max()) / self.friction,
+            "work": work / (self.friction * way) if told and way > WITHIN else None,
+            "peak": float(smooth.max()) / self.friction if told else None,
             "creep": 1000 * abs(_out(world) - opened),
         }
 
@@ -272,8 +275,14 @@ def _tool(world: World, hand: Manipulator) -> FloatArray:
 
 
 def _pull(world: World, outward: FloatArray) -> float:
-    """What the robot's other links do to the drawer along its way [N]."""
-    forces = world.contact_forces()
+    """What the robot's other links do to the drawer along its way [N]; no number in an engine that
+    does not tell."""
+    try:
+        forces = world.contact_forces()
+    except EngineFailed as error:
+        if error.remote != NotSupportedError.__name__:
+            raise
+        return float("nan")
     of_links = (forces[pair][:3] for pair in forces if pair[0] == f"link/{DRAWER}")
     return float(sum(outward @ force for force in of_links))
 
