@@ -38,8 +38,8 @@ def parity_of_full_scene(subject: Subject) -> None:
 @check(Capability.SELF_COLLIDE, any_robot)
 def parity_where_links_collide(subject: Subject) -> None:
     """The robot alone passes parity where its links collide with each other, but for those that one
-    joint joins, also where some of them overlap; and, where pairs can be kept apart, beside a slider
-    with which they collide, not with each other."""
+    joint joins, also where some of them overlap. Where pairs can be kept apart, it passes beside a
+    slider, too, with which its links collide, and not with each other."""
     with subject.world(Scene("colliding", robot=replace(subject.arm, self_collide=True))):
         pass  # loading checks parity
     if subject.can(Capability.APART):
