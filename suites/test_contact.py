@@ -1,19 +1,19 @@
-"""Hold and carry, pour, nest: does what the fingers hold stay there, are balls conserved, do bowls
-rest in each other?
+"""Hold and carry, pour, nest, open: does what the fingers hold stay there, are balls conserved, do
+bowls rest in each other, does a drawer take the work of its friction?
 
     pytest suites/test_contact.py --sim=all --reps=20
 
 What weighs 0.8 of what two pads hold by friction is carried, shaken and held still; what weighs
 1.25 of it slips out (docs/contact.md). A pad that lets go, and one that glues, both fail.
 Balls that are poured into a tray are all in it at the end. Nested bowls stand as high as their
-walls say.
+walls say. A drawer is pulled by 15 cm with its friction, and stays where it is let go.
 """
 
 from typing import get_args
 
 import pytest
 
-from pytest_simbench.tasks import Carrying, Nesting, Pouring, Slipping
+from pytest_simbench.tasks import Carrying, Nesting, Opening, Pouring, Slipping
 from pytest_simbench.tasks.carrying import Shape
 
 SHAPES = get_args(Shape)
@@ -49,3 +49,14 @@ def test_nests(repeat, threshold, bowls):
     result.assert_crashed_at_most(threshold("crashed", 0.15))
     result.assert_at_most("height_error", threshold("height_error", 0.5))
     result.assert_at_most("tilt", threshold("tilt", 1.0))
+
+
+@pytest.mark.needs("apart", "self_collide")
+@pytest.mark.parametrize("friction", [10, 40])
+def test_opens_a_drawer(repeat, threshold, friction):
+    result = repeat(Opening(float(friction)))
+    result.assert_crashed_at_most(threshold("crashed", 0.15))
+    result.assert_at_least("opened", threshold("opened", 0.8))
+    result.assert_at_most("slip", threshold("slip", 1.0))
+    result.assert_at_most("creep", threshold("creep", 1.0))
+    result.assert_at_most("held_back", threshold("held_back", 1.0))

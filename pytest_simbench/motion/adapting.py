@@ -128,14 +128,17 @@ def _numbers(joint: ET.Element, tag: str, key: str, default: str) -> Vector3:
 MOUNT_JOINT = "mount_of_the_hand"
 
 
-def mounted(arm: ET.Element, hand: ET.Element, root: str, mount: str, pose: Pose) -> ET.Element:
-    """The URDF of an arm with a hand.
+def mounted(
+    arm: ET.Element, hand: ET.Element, root: str, mount: str, pose: Pose, joint: str = MOUNT_JOINT
+) -> ET.Element:
+    """The URDF of an arm with a hand, or with a thing beside it.
 
     Args:
         hand: a URDF with the hand in it.
         root: link of `hand` with which the hand begins; what hangs on it is the hand.
         mount: link of `arm` that carries it.
         pose: of `root` in `mount`.
+        joint: name of the joint that holds it there.
 
     Raises:
         DescriptionError: no such link, or a name that both have.
@@ -153,10 +156,10 @@ def mounted(arm: ET.Element, hand: ET.Element, root: str, mount: str, pose: Pose
     for element in parts:
         if (element.tag, element.get("name")) in taken:
             raise DescriptionError(
-                f"arm and hand both have the {element.tag} {element.get('name')!r}; rename one"
+                f"two descriptions both have the {element.tag} {element.get('name')!r}; rename one"
             )
     whole = ET.Element("robot", arm.attrib)
-    whole.extend([*arm, *parts, _fixed(MOUNT_JOINT, mount, root, pose)])
+    whole.extend([*arm, *parts, _fixed(joint, mount, root, pose)])
     return whole
 
 

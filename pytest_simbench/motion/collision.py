@@ -12,7 +12,9 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
+from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.robot_files import description_xml
+from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.motion.model import RobotModel, last_change
 from pytest_simbench.scene import Body, FloatArray, Pose, Robot, Scene
 
@@ -61,6 +63,7 @@ class PlanningScene:
         half_space = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
         ground = geometry.addGeometryObject(pin.GeometryObject(GROUND, 0, inverse, half_space))
         moving = [i for i in self._links if geometry.geometryObjects[i].parentJoint > 0]
+        self._find_things(geometry)
         for obstacle_index in [*self._bodies.values(), ground]:
             for link in moving:
                 geometry.addCollisionPair(pin.CollisionPair(link, obstacle_index))
@@ -68,8 +71,9 @@ class PlanningScene:
         self._geometry = geometry
         self._pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
         self._exact, self._wide = pin.GeometryData(geometry), pin.GeometryData(geometry)
-        for request, (_, second) in zip(self._wide.collisionRequests, self._pairs, strict=True):
-            request.security_margin = MARGIN * scale if second >= len(self._links) else 0.0
+        arm = set(self._links) - {shape for shapes in self._things.values() for shape in shapes}
+        for request, pair in zip(self._wide.collisionRequests, self._pairs, strict=True):
+            request.security_margin = 0.0 if arm.issuperset(pair) else MARGIN * scale
         self.update({body.name: body.pose for body in scene.free_bodies})
 
     def _add_held_cubes(self, scene: Scene, geometry: pin.GeometryModel, ground: int) -> None:
@@ -96,9 +100,32 @@ class PlanningScene:
                 if other != body.name:
                     geometry.addCollisionPair(pin.CollisionPair(index, obstacle))
 
-    def update(self, poses: Mapping[str, Pose]) -> None:
-        """Take over the cubes' present poses in the world."""
+    def _find_things(self, geometry: pin.GeometryModel) -> None:
+        """Shapes of the links beside the arm, by link, each with its pose there."""
+        self._things: dict[str, dict[int, pin.SE3]] = {}
+        self._prepared: PreparedRobot | None = None
+        if not self.model.robot.beside:
+            return
+        self._prepared = prepared = PreparedRobot(self.model.robot)
+        for index in self._links:
+            shape = geometry.geometryObjects[index]
+            frame = self.model.pin.frames[shape.parentFrame]
+            link, pose = prepared.places[frame.name]
+            if shape.parentJoint == 0 and link != prepared.root:
+                within = pin.SE3(pose.matrix()) * frame.placement.actInv(shape.placement)
+                self._things.setdefault(link, {})[index] = within
+
+    def update(self, poses: Mapping[str, Pose], joints: FloatArray | None = None) -> None:
+        """Take over the cubes' present poses in the world, and where the robot's joints are, for
+        what is beside the arm."""
         inverse = self.model.base.inverse()
+        if self._prepared and joints is not None:
+            names = self.model.robot.joint_names
+            placed = link_poses(self._prepared, dict(zip(names, joints.tolist(), strict=True)))
+            for link, shapes in self._things.items():
+                for index, within in shapes.items():
+                    at = inverse * pin.SE3(placed[link].matrix()) * within
+                    self._geometry.geometryObjects[index].placement = at
         for name, pose in poses.items():
             shape = self._geometry.geometryObjects[self._bodies[name]]
             shape.placement = inverse * pin.SE3(pose.matrix())
@@ -148,7 +175,7 @@ class PlanningScene:
         frame, (n, 3), of the links that joints `first` to `last` carry; the fingers at
         `opening`."""
         model = self.model
-        fingers = np.full(len(model.robot.joints) - model.arm, opening)
+        fingers = np.full(model.pin.nq - model.arm, opening)
         q = np.concatenate([model.robot.column("initial_position")[: model.arm], fingers])
         pin.updateGeometryPlacements(model.pin, model.data, self._geometry, self._exact, q)
         tool = pin.updateFramePlacement(model.pin, model.data, model.tool)
@@ -165,7 +192,9 @@ class PlanningScene:
         if self._active_for == (self.held, ignored):
             return
         self._active_for = self.held, ignored
-        off = {self._bodies[name] for name in ignored}
+        off: set[int] = set()
+        for name in ignored:
+            off.update(self._things.get(name) or (self._bodies[name],))
         if self.held is not None:
             off.add(self._bodies[self.held])
         off |= {index for name, index in self._riding.items() if name != self.held}
@@ -179,7 +208,8 @@ class PlanningScene:
         """The first two things that touch at arm joints `arm`, or None.
 
         Args:
-            ignored: bodies that may be touched, the cube to be grasped for instance.
+            ignored: bodies that may be touched, the cube to be grasped for instance, and links
+                beside the arm.
             margin: keep `MARGIN` from obstacles.
         """
         return self.first_collision(np.asarray(arm)[None], ignored=ignored, margin=margin)
@@ -191,7 +221,7 @@ class PlanningScene:
         self._activate(tuple(ignored))
         model, geometry = self.model, self._geometry
         data = self._wide if margin else self._exact
-        fingers = np.full(len(model.robot.joints) - model.arm, self.opening)
+        fingers = np.full(model.pin.nq - model.arm, self.opening)
         for arm in path:
             q = np.concatenate([arm, fingers])
             if pin.computeCollisions(model.pin, model.data, geometry, data, q, True):

@@ -244,7 +244,7 @@ class Servo:
         self.model = RobotModel(scene.robot)
         self._weights = self.model.pin.copy()
         self._weights.gravity.linear = self.model.base.rotation.T @ np.array(scene.gravity)
-        for k, share in enumerate(scene.robot.column("gravity"), start=1):
+        for k, share in enumerate(scene.robot.column("gravity")[: self.model.pin.nq], 1):
             link = self._weights.inertias[k]
             self._weights.inertias[k] = pin.Inertia(share * link.mass, link.lever, link.inertia)
         self._data = self._weights.createData()
@@ -283,6 +283,7 @@ class Servo:
 
     def holding_effort(self, position: FloatArray) -> FloatArray:
         """What holds the arm against gravity, (n_joints,) [N m or N]; the fingers press alone."""
-        effort = pin.computeGeneralizedGravity(self._weights, self._data, position).copy()
-        effort[self.model.arm :] = 0.0
-        return np.asarray(effort)
+        model, effort = self.model, np.zeros_like(position)
+        weights = pin.computeGeneralizedGravity(self._weights, self._data, position[: model.pin.nq])
+        effort[: model.arm] = weights[: model.arm]
+        return effort

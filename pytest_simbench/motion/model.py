@@ -16,7 +16,8 @@ from pytest_simbench.simulator import DescriptionError
 
 
 class RobotModel:
-    """The robot's model; joint vectors are in the order of `robot.joints`, arm first.
+    """The robot's model; joint vectors are in the order of `robot.joints`, arm first, without those
+    beside the arm.
 
     Attributes:
         lower, upper: position limits of the arm joints [rad], (arm,).
@@ -36,10 +37,10 @@ class RobotModel:
         self.upper = np.array(self.pin.upperPositionLimit[: self.arm])
         self.tool = self.pin.getFrameId(robot.tool_frame)
         self.base = pin.SE3(robot.base.matrix())
-        self.pin.armature = robot.column("armature")
+        self.pin.armature = robot.column("armature")[: self.pin.nq]
         self._loaded: dict[tuple[object, ...], pin.Model] = {}
         self.effort_limits = robot.column("effort_limit")[: self.arm]
-        self._fingers = np.array([joint.initial_position for joint in robot.joints[self.arm :]])
+        self._fingers = robot.column("initial_position")[self.arm : self.pin.nq]
 
     @property
     def limits(self) -> MotionLimits:
@@ -224,7 +225,18 @@ def _checked(robot: Robot, changed: tuple[int, ...]) -> pin.Model:
         model = pin.buildModelFromUrdf(robot.urdf)
     except Exception as error:
         raise DescriptionError(f"cannot use the robot description {robot.urdf}: {error}") from None
+    if robot.beside:
+        model = _without_things(model, robot)
     names = list(model.names)[1:]
-    if names != list(robot.joint_names):
+    if names != [name for name in robot.joint_names if name not in robot.beside]:
         raise DescriptionError(f"{robot.urdf} has joints {names}, not {robot.joint_names}")
     return model
+
+
+def _without_things(model: pin.Model, robot: Robot) -> pin.Model:
+    """The model with the joints beside the arm fixed where they start."""
+    q = pin.neutral(model)
+    for joint in robot.joints:
+        if joint.name in robot.beside:
+            q[model.joints[model.getJointId(joint.name)].idx_q] = joint.initial_position
+    return pin.buildReducedModel(model, [model.getJointId(name) for name in robot.beside], q)

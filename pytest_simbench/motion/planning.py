@@ -181,8 +181,8 @@ class MotionPlanner:
 
     def set_points(self, timed: Timed, fingers: float | FloatArray) -> Trajectory:
         """Set points of all joints with feed-forward efforts."""
-        rows = len(timed.position)
-        others = len(self.model.robot.joints) - self.model.arm
+        rows, robot = len(timed.position), self.model.robot
+        others = self.model.pin.nq - self.model.arm
         column = np.broadcast_to(np.asarray(fingers, dtype=float), (rows,))[:, None]
         position = np.hstack([timed.position, np.repeat(column, others, axis=1)])
         padding = np.zeros((rows, others))
@@ -190,7 +190,10 @@ class MotionPlanner:
         acceleration = np.hstack([timed.acceleration, padding])
         effort = self.model.inverse_dynamics(self.gravity, position, velocity, acceleration)
         effort[:, self.model.arm :] = 0.0  # the squeeze is the fingers' own drive alone
-        return Trajectory(TICK, position, velocity, effort)
+        beside = np.zeros((rows, len(robot.beside)))
+        still = beside + robot.column("initial_position")[self.model.pin.nq :]
+        parts = ((position, still), (velocity, beside), (effort, beside))
+        return Trajectory(TICK, *(np.hstack(part) for part in parts))
 
     def _search(self, start: FloatArray, goal: FloatArray, seed: int) -> FloatArray:
         """RRTConnect from start to goal, way points (n, arm)."""

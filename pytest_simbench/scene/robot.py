@@ -229,7 +229,7 @@ class Robot(Wire):
         packages: directory of each `package://NAME/` that the URDF refers to.
         srdf: path of its SRDF file, which lists the link pairs not to be checked for collision;
             empty for none.
-        joints: the driven joints in command order, arm first, then fingers.
+        joints: the driven joints in command order, arm first, then fingers, then those `beside`.
         gripper: the fingers.
         tool_frame: link whose origin is the tool centre point.
         base: pose of the root link in the world.
@@ -245,9 +245,11 @@ class Robot(Wire):
             joins never do. Only for engines with the capability `self_collide`.
         couplings: what moves joints together, beside the gripper; only for engines with the
             capability `couplings`.
+        beside: names of the last joints, where they move a thing that stands beside the arm
+            (`motion.beside`): plans move around it, and no command moves it.
     """
 
-    optional = ("closures", "self_collide", "couplings")
+    optional = ("closures", "self_collide", "couplings", "beside")
     unwritten = ("limits", "swing", "stand")
 
     name: str
@@ -265,6 +267,7 @@ class Robot(Wire):
     closures: tuple[Closure, ...] = ()
     self_collide: bool = False
     couplings: tuple[Coupling, ...] = ()
+    beside: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         check_name(self.name, "a robot")
@@ -286,6 +289,12 @@ class Robot(Wire):
                 f"the gripper of {self.name!r} has the joints {', '.join(unknown)}, which have no "
                 f"drives; choose from {', '.join(names)}"
             )
+        last = names[len(names) - len(self.beside) :]
+        if self.beside != last or set(self.beside) & set(self.gripper.joints):
+            raise SceneError(
+                f"the joints {', '.join(self.beside)} beside robot {self.name!r} are not its last, "
+                f"which are {', '.join(last)}; put them last, after the gripper's"
+            )
         coupled = [name for c in self.couplings for name in (c.follower, c.leader)]
         if unknown := sorted({name for name in coupled if name not in names}):
             raise SceneError(
@@ -306,7 +315,8 @@ class Robot(Wire):
 
     @property
     def arm_joints(self) -> tuple[Joint, ...]:
-        return tuple(joint for joint in self.joints if joint.name not in self.gripper.joints)
+        others = (*self.gripper.joints, *self.beside)
+        return tuple(joint for joint in self.joints if joint.name not in others)
 
     @property
     def finger_indices(self) -> list[int]:

@@ -110,7 +110,8 @@ class SetPoints:
         self.position, self.effort = np.array(position, dtype=float), np.array(effort, dtype=float)
         self._robot, self._period, self._kinematics = robot, period, kinematics
         self._fingers = np.array(robot.finger_indices, dtype=int)
-        self._arm = np.setdiff1d(np.arange(len(robot.joints)), self._fingers)
+        arm = [robot.joint_names.index(joint.name) for joint in robot.arm_joints]
+        self._arm = np.array(arm, dtype=int)
         self._driven = robot.column("stiffness") > FREE
         if kinematics is not None:
             self.effort = kinematics.holding_effort(self.position)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.holding import Holding
     from pytest_simbench.tasks.impacting import Impacting
     from pytest_simbench.tasks.nesting import Nesting
+    from pytest_simbench.tasks.opening import Opening
     from pytest_simbench.tasks.pouring import Pouring
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
     from pytest_simbench.tasks.replaying import Log, Replaying
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 __all__ = [
     "ArmFollowing", "ArmPushing", "Carrying", "CorrectedArmFollowing", "CurvePushing", "Fitting",
     "GoalTask", "Holding", "Impacting", "Jitter", "LeaningTowers", "Log", "Moment", "Nesting",
-    "Outcome", "PickAndPlace", "Pouring", "Pushing", "PushingToGoal", "Reaching", "Replaying",
-    "Settling", "Slipping", "Stacking", "Task", "Throwing", "Tossing", "rests_on",
+    "Opening", "Outcome", "PickAndPlace", "Pouring", "Pushing", "PushingToGoal", "Reaching",
+    "Replaying", "Settling", "Slipping", "Stacking", "Task", "Throwing", "Tossing", "rests_on",
 ]  # fmt: skip
 
 _MODULES = {
@@ -42,6 +43,7 @@ _MODULES = {
     "holding": ("Holding",),
     "impacting": ("Impacting",),
     "nesting": ("Nesting",),
+    "opening": ("Opening",),
     "pouring": ("Pouring",),
     "pushing": ("CurvePushing", "Pushing"),
     "replaying": ("Log", "Replaying"),

@@ -185,7 +185,7 @@ class Arm:
         motion = self.world.follow(trajectory, log_period=log_period)
         self.arm = trajectory.position[-1, : self.model.arm].copy()
         if self.gripper.joints:
-            self.fingers = float(trajectory.position[-1, -1])
+            self.fingers = float(trajectory.position[-1, self.model.arm])
         return motion
 
     def close_hand(self, around: str | None = None, seen: Pose | None = None) -> None:
@@ -237,7 +237,7 @@ class Arm:
     def _planning(self) -> Iterator[None]:
         """What is done is planning, among the cubes as they lie now; its time is measured."""
         with self.world.stopwatch.measuring("plan"):
-            self.planning.update(self.world.poses())
+            self.planning.update(self.world.poses(), self.world.joints[0])
             self.planning.opening = self.fingers if self.held is None else self.grasp.touching
             if self.held is not None and self.planning.held != self.held:
                 self.planning.attach(self.held, self._grip)

@@ -22,7 +22,7 @@ from pytest_simbench.motion.grips import grips, turns
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over, top_down_grasps
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.throw import Throw
-from pytest_simbench.scene import Box, FloatArray, Pose, Robot, Scene
+from pytest_simbench.scene import Body, Box, FloatArray, Pose, Robot, Scene
 from pytest_simbench.tasks.arm import Arm, LostBody
 from pytest_simbench.tasks.base import CUBE_SIZE
 
@@ -51,22 +51,35 @@ class Manipulator(Arm):
             LostBody: it is not in the hand after lifting.
         """
         seen = self.world.pose(name)
-        body = self.world.scene.body(name).moved_to(seen)
-        with self.world.stopwatch.measuring("plan"):
-            widths = {grip.tool: grip.width for grip in grips(self.model.robot, body, self.scale)}
-        down, above = self._plan_choice([self._aside(tool) for tool in widths], ignored=(name,))
-        self.go_to(above, speed=self.speeds.free)
-        self.move_straight(down, speed=self.speeds.contact, ignored=(name,))
-        grasp = self._aside(down, back=True)
-        if grasp != down:
-            self.move_straight(grasp, speed=self.speeds.contact, ignored=(name,))
-        if self.model.has_parallel_fingers:
-            self.grasp = Grasp(widths[down] / 2)
+        grasp = self.reach_for(self.world.scene.body(name).moved_to(seen), (name,))
         self.close_hand(around=name, seen=seen)
         self.move_straight(
             grasp.translated(z=self.approach), speed=self.speeds.carry, ignored=(name,)
         )
         self.check_held()
+
+    def reach_for(self, body: Body, ignored: tuple[str, ...]) -> Pose:
+        """Bring the open hand from above to where it grasps a body, or a part of something that is
+        described as one; the pose of the tool there.
+
+        Args:
+            ignored: what may be touched: bodies, and links beside the arm.
+
+        Raises:
+            Ungraspable: the hand cannot hold it as it lies; nothing has moved.
+            PlanningError: it cannot be reached.
+        """
+        with self.world.stopwatch.measuring("plan"):
+            widths = {grip.tool: grip.width for grip in grips(self.model.robot, body, self.scale)}
+        down, above = self._plan_choice([self._aside(tool) for tool in widths], ignored=ignored)
+        self.go_to(above, speed=self.speeds.free)
+        self.move_straight(down, speed=self.speeds.contact, ignored=ignored)
+        grasp = self._aside(down, back=True)
+        if grasp != down:
+            self.move_straight(grasp, speed=self.speeds.contact, ignored=ignored)
+        if self.model.has_parallel_fingers:
+            self.grasp = Grasp(widths[down] / 2)
+        return grasp
 
     def place(self, target: Pose) -> None:
         """Bring the held body to `target` [pose of its centre] and let it go there.

@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pytest_simbench.laws.mechanisms import Part, mechanism
+from pytest_simbench.motion.beside import with_thing
 from pytest_simbench.parity.compare import ParityResult, compare
 from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Pose, Scene
@@ -36,9 +38,15 @@ def parity_of_full_scene(subject: Subject) -> None:
 @check(Capability.SELF_COLLIDE, any_robot)
 def parity_where_links_collide(subject: Subject) -> None:
     """The robot alone passes parity where its links collide with each other, but for those that one
-    joint joins, also where some of them overlap."""
+    joint joins, also where some of them overlap. Where pairs can be kept apart, it passes beside a
+    slider, too, with which its links collide, and not with each other."""
     with subject.world(Scene("colliding", robot=replace(subject.arm, self_collide=True))):
         pass  # loading checks parity
+    if subject.can(Capability.APART):
+        part = Part("slider beside", (0.0, 1.0, 0.0), slides=True, shape=(0.1, 0.1, 0.1))
+        slider = mechanism("slider", part, base=Pose.at(0.7, 0.0, 0.3))
+        with subject.world(with_thing(Scene("beside", robot=subject.arm), slider)):
+            pass
 
 
 def _truth(subject: Subject) -> Scene:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -119,6 +120,7 @@ class Drake(Simulator):
         self.plant.SetPositionsAndVelocities(self.context, state)
         self._led = [body.prescribed for body in scene.free_bodies]
         self._has_camera = False
+        self._began = state
         self.simulator.Initialize()
 
     def _start_drives(self, robot: Robot) -> None:
@@ -160,6 +162,7 @@ class Drake(Simulator):
 
     def step(self) -> None:
         self._steps += 1
+        self._began = self._state()
         self.simulator.AdvanceTo(self._steps * self.settings.timestep)
 
     @property
@@ -176,18 +179,34 @@ class Drake(Simulator):
         return np.asarray(self.plant.GetPositionsAndVelocities(self.context)[self._joints_at])
 
     def save(self) -> tuple[int, FloatArray, Any]:
-        state = self.plant.GetPositionsAndVelocities(self.context).copy()
-        return self._steps, state, getattr(self, "_commanded", None)
+        return self._steps, self._state(), getattr(self, "_commanded", None)
 
     def restore(self, state: tuple[int, FloatArray, Any]) -> None:
         self._steps, values, commanded = state
         self.root.SetTime(self._steps * self.settings.timestep)
         self.plant.SetPositionsAndVelocities(self.context, values)
+        self._began = values
         if commanded is not None:
             self.command(*commanded)
         self.simulator.Initialize()
 
-    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+    def _state(self) -> FloatArray:
+        return np.array(self.plant.GetPositionsAndVelocities(self.context))
+
+    @contextmanager
+    def _as_it_began(self) -> Iterator[None]:
+        """In the state from which the last step went out: Drake tells the forces of the step that
+        would follow the present one, for which no set point is known yet."""
+        now = self._state()
+        self.plant.SetPositionsAndVelocities(self.context, self._began)
+        yield
+        self.plant.SetPositionsAndVelocities(self.context, now)
+
+    def contact_forces(self) -> list[tuple[str, str, FloatArray]]:
+        with self._as_it_began():
+            return list(self._contact_forces())
+
+    def _contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
         results = self.plant.get_contact_results_output_port().Eval(self.context)
         names = {made: name for name, group in self._named_shapes() for made in group}
         for k in range(results.num_point_pair_contacts()):
@@ -210,6 +229,10 @@ class Drake(Simulator):
             yield name if name == "ground" else kind + name, made
 
     def joint_wrenches(self) -> FloatArray:
+        with self._as_it_began():
+            return self._joint_wrenches()
+
+    def _joint_wrenches(self) -> FloatArray:
         told = self.plant.get_reaction_forces_output_port().Eval(self.context)
         order = list(self.plant.GetJointIndices())
         rows = []

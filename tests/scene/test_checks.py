@@ -110,6 +110,11 @@ def test_a_joint_that_cannot_be(change: dict[str, Any], said: str) -> None:
         ({"base": Pose((NAN, 0, 0))}, "the position of the base of 'panda' is nan"),
         ({"joints": (JOINT, JOINT)}, "robot 'panda' has several drives for j"),
         ({"gripper": Gripper(("x",), 0.1, 0.0, 1.0)}, "the gripper .* the joints x, which have no"),
+        ({"beside": ("panda_joint1",)}, "the joints panda_joint1 beside robot 'panda' are not its"),
+        (
+            {"beside": ("panda_finger_joint2",)},
+            "_joint2; put them last, after the grip",
+        ),
     ],
 )
 def test_a_robot_that_cannot_be(change: dict[str, Any], said: str) -> None:
