@@ -146,12 +146,22 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item not in slow]
 
 
+LEAN = "-p no:hypothesispytest"
+"""Hypothesis' own plugin imports all of Hypothesis when it sums up: 0.6 CPU seconds a run. What
+perturbs asks Hypothesis itself."""
+
+
 @pytest.fixture
 def pytester(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
-    """Runs without Hypothesis' own plugin, which imports all of Hypothesis when it sums up: 0.6 CPU
-    seconds a run. What perturbs asks Hypothesis itself."""
-    monkeypatch.setenv("PYTEST_ADDOPTS", "-p no:hypothesispytest")
+    """Its runs draw nothing, but where a test asks for `drawn` too."""
+    monkeypatch.setenv("PYTEST_ADDOPTS", f"{LEAN} -p tests.undrawn")
     return pytester
+
+
+@pytest.fixture
+def drawn(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Inner runs draw figures and replays, as users' runs do."""
+    monkeypatch.setenv("PYTEST_ADDOPTS", LEAN)
 
 
 @pytest.fixture(autouse=True)

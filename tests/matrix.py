@@ -250,7 +250,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as temporary:
         folder = (given.folder or Path(temporary)).absolute()
         built, copy = Path(temporary, "built"), Path(temporary, "source")
-        hidden = shutil.ignore_patterns(".*", "build", "*.egg-info")  # an old build would stay in
+        # an old build would stay in; and what runs beside this compiles files meanwhile
+        hidden = shutil.ignore_patterns(".*", "build", "*.egg-info", "__pycache__")
         shutil.copytree(HERE, copy, ignore=hidden)
         wheel = build(copy, built)
         known = EVERY if given.all or given.only else QUICK

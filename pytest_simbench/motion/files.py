@@ -38,9 +38,6 @@ from pytest_simbench.motion.table import FileTable
 from pytest_simbench.scene import Gripper, Joint, MotionLimits, Pose, Robot, Scene, SceneError
 from pytest_simbench.simulator import DescriptionError
 
-ARMS = Path(__file__).with_name("arms")
-"""Files of the built-in arms."""
-
 LARGEST_FILE = 2**20
 """[bytes]"""
 

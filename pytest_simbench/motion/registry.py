@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 
 from pytest_simbench.motion.errors import RobotError
-from pytest_simbench.motion.files import ARMS, read_robot
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Robot
 
@@ -20,9 +20,20 @@ GROUP = "pytest_simbench.robots"
 DEFAULT = "panda"
 """The robot of the reference study: tasks use it where none is chosen."""
 
+ARMS = Path(__file__).with_name("arms")
+"""The files of built-in robots."""
+
+
+def _from_file(path: str | Path) -> Robot:
+    """The robot of a file. What reads it loads Pinocchio, Coal and SciPy; names need none."""
+    from pytest_simbench.motion.files import read_robot
+
+    return read_robot(path)
+
+
 BUILT_IN: Mapping[str, Callable[[], Robot]] = {
     DEFAULT: panda,
-    **{path.stem: partial(read_robot, path) for path in sorted(ARMS.glob("*.toml"))},
+    **{path.stem: partial(_from_file, path) for path in sorted(ARMS.glob("*.toml"))},
 }
 """Robots that come with the package, by name."""
 
@@ -37,7 +48,7 @@ def find(text: str) -> Robot:
     """
     if not text.endswith(FILE):
         return known_robot(text)
-    robot = read_robot(text)
+    robot = _from_file(text)
     if robot.name in known():
         raise RobotError(
             f"{text}: the name {robot.name!r} is that of a known robot; give it another one"

@@ -199,33 +199,20 @@ def test_without_a_file_or_a_joint_there_is_no_scene(tmp_path: Path) -> None:
 
 @pytest.mark.engine
 @pytest.mark.parametrize("name", ADAPTERS)
-def test_in_every_engine_a_drawer_falls_to_its_stop(tmp_path: Path, case: Case, name: str) -> None:
-    """By its weight, which nothing brakes."""
-    scene = read(tmp_path, ('<dynamics damping="4" friction=".5"/>', "")).scene
-    with (
-        closing(SimulatorHandle(case_of(case, name))) as handle,
-        handle.episode(scene) as world,
-    ):
-        world.wait(1.0)
-        rail, hinge = world.joints[0]
+def test_in_every_engine_a_drawer_falls(tmp_path: Path, case: Case, name: str) -> None:
+    """To its stop where nothing brakes it, else at its end speed: m g = F + d v."""
+    own = 'damping="4" friction=".5"'
+    free = read(tmp_path, (f"<dynamics {own}/>", "")).scene
+    braked = read(tmp_path, (own, 'damping="100" friction="5"')).scene
+    with closing(SimulatorHandle(case_of(case, name))) as handle:
+        with handle.episode(free) as world:
+            world.wait(1.0)
+            rail, hinge = world.joints[0]
         assert rail == pytest.approx(-0.2, abs=5e-3)
         assert hinge == pytest.approx(0.0, abs=0.01)
-
-
-@pytest.mark.engine
-@pytest.mark.parametrize("name", ADAPTERS)
-def test_a_drawer_with_damping_falls_at_its_end_speed(
-    tmp_path: Path, case: Case, name: str
-) -> None:
-    """m g = F + d v."""
-    change = ('damping="4" friction=".5"', 'damping="100" friction="5"')
-    scene = read(tmp_path, change).scene
-    with (
-        closing(SimulatorHandle(case_of(case, name))) as handle,
-        handle.episode(scene) as world,
-    ):
-        world.wait(0.3)
-        before = world.joints[0][0]
-        world.wait(0.5)
-        speed = (world.joints[0][0] - before) / 0.5
+        with handle.episode(braked) as world:
+            world.wait(0.3)
+            before = world.joints[0][0]
+            world.wait(0.5)
+            speed = (world.joints[0][0] - before) / 0.5
         assert speed == pytest.approx(-(2 * 9.80665 - 5) / 100, rel=0.02)

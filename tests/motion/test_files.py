@@ -11,11 +11,11 @@ import pytest
 
 from pytest_simbench.motion.collision import MARGIN
 from pytest_simbench.motion.errors import RobotError
-from pytest_simbench.motion.files import ARMS, read_robot
+from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.planning import CHECK_SPACING
-from pytest_simbench.motion.registry import BUILT_IN, find
+from pytest_simbench.motion.registry import ARMS, BUILT_IN, find
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import PreparedRobot
 from tests.motion.small_arm import TOML, URDF, joint, link, small_arm

@@ -11,10 +11,10 @@ import pytest
 
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import RobotError
-from pytest_simbench.motion.files import ARMS, read_robot
+from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.motion.registry import find
+from pytest_simbench.motion.registry import ARMS, find
 from pytest_simbench.motion.swing import LANDING, THROWN, found_swing, main
 from pytest_simbench.motion.throw import feasible_swing, released, swing_of
 from pytest_simbench.scene import STANDARD_GRAVITY, Pose, Robot, Scene, SceneError

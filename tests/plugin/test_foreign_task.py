@@ -94,6 +94,7 @@ def told(text: str) -> None:
     assert "does not say" not in text
 
 
+@pytest.mark.usefixtures("drawn")
 def test_where_the_package_is_gone(
     pytester: pytest.Pytester, package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -84,6 +84,7 @@ def blocks(pytester: pytest.Pytester) -> Path:
 
 
 @pytest.mark.engine
+@pytest.mark.usefixtures("drawn")
 def test_alone_it_runs_the_suite_and_says_whether_a_difference_is_noise(
     pytester: pytest.Pytester, blocks: Path
 ) -> None:

@@ -91,6 +91,7 @@ SETTINGS = """
 @pytest.mark.parametrize(
     "arguments", [[], ["-n2"], ["--sim-jobs=2"]], ids=["plain", "xdist", "jobs"]
 )
+@pytest.mark.usefixtures("drawn")
 def test_each_setting_class_and_task_is_a_row_with_files_of_its_own(
     pytester: pytest.Pytester, arguments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -164,6 +165,7 @@ def test_a_second_attempt_replaces_the_first_in_tables_and_both_stay(
     assert [(r["repetition"], r["attempt"]) for r in records(path)[2:]] == [(2, 1), (2, 2)]
 
 
+@pytest.mark.usefixtures("drawn")
 def test_what_could_not_be_written_is_said_and_not_shown_as_there(
     pytester: pytest.Pytester,
 ) -> None:

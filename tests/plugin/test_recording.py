@@ -81,6 +81,7 @@ def test_a_run_without_traces_says_so(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["no recordings: the run has no traces; see --sim-trace"])
 
 
+@pytest.mark.usefixtures("drawn")
 def test_pictures_and_videos_are_taken_beside_what_is_measured(pytester: pytest.Pytester) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
     pytester.makepyfile(TEST + TEST.replace("def test_falling", "def test_again"))

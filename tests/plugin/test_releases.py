@@ -22,7 +22,7 @@ def planted(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
     importable(monkeypatch, pytester.path / "site")
 
 
-@pytest.mark.usefixtures("planted")
+@pytest.mark.usefixtures("planted", "drawn")
 def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
     result = pytester.runpytest_subprocess("--sim-history=planted:4", "--reps=5")
     result.assert_outcomes(passed=4)

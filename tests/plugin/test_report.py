@@ -43,6 +43,7 @@ def test_an_interrupted_report_is_one_sentence(pytester: pytest.Pytester) -> Non
     assert len((pytester.path / "o" / "records.jsonl").read_text().splitlines()) == 5
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_run_ends_with_its_page_and_the_answer(pytester: pytest.Pytester) -> None:
     """The answer first, where the page is last, and no table of pytest-benchmark between."""
     result = run(pytester, "--sim-badge=site/badge.json")
@@ -105,6 +106,7 @@ def test_benchmarks_of_others_keep_their_table(pytester: pytest.Pytester) -> Non
     assert "test_falling" not in table
 
 
+@pytest.mark.usefixtures("drawn")
 def test_the_comparison_with_a_baseline_stands_on_the_page_which_is_made_again(
     pytester: pytest.Pytester,
 ) -> None:

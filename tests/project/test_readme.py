@@ -37,6 +37,7 @@ def test_its_two_commands_are_these() -> None:
     assert "```sh\nbash .ci/run\n```" in README
 
 
+@pytest.mark.usefixtures("drawn")
 def test_it_begins_with_a_test_that_runs(pytester: pytest.Pytester) -> None:
     blocks = re.findall(r"```(\w+)\n(.*?)```", README, re.DOTALL)
     (first, code), (second, command) = blocks[:2]

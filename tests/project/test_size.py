@@ -37,4 +37,4 @@ def test_lines_of_python_and_words_of_markdown(
 
 
 def test_ci_runs_it() -> None:
-    assert "\n.venv/bin/python tests/size.py\n" in (ROOT / ".ci" / "run").read_text("utf-8")
+    assert "\n    .venv/bin/python tests/size.py\n" in (ROOT / ".ci" / "run").read_text("utf-8")

@@ -18,7 +18,7 @@ Plant = Callable[[Any], None]
 
 class Planting:
     """To be put before an adapter among the bases. Its settings have `fault` besides, the quantity
-    in which a fault is planted, "" for none.
+    in which a fault is planted, "" for none; several have `;` between them.
 
     Attributes:
         faults: by quantity.
@@ -34,8 +34,8 @@ class Planting:
 
     def load(self, scene: Scene) -> None:
         super().load(scene)  # type: ignore[misc]
-        if self.settings.fault:
-            self.faults[self.settings.fault](self)
+        for quantity in filter(None, self.settings.fault.split(";")):
+            self.faults[quantity](self)
 
 
 def _with_fault(settings: Settings) -> Settings:

@@ -1,0 +1,11 @@
+"""A plugin of inner runs: as where neither the extra `figures` nor `replay` is installed.
+
+Whatever a run ends with would else be drawn twice, and the replay's viewer be loaded: as much CPU
+time as all the rest of a small run.
+"""
+
+from __future__ import annotations
+
+import sys
+
+sys.modules["matplotlib"] = sys.modules["trimesh"] = None  # type: ignore[assignment]
