@@ -21,7 +21,6 @@ DEFAULT = "panda"
 """The robot of the reference study: tasks use it where none is chosen."""
 
 ARMS = Path(__file__).with_name("arms")
-"""The files of built-in robots."""
 
 
 def _from_file(path: str | Path) -> Robot:

@@ -51,7 +51,9 @@ def test_every_command_has_help(capsys: pytest.CaptureFixture[str], name: str) -
 )
 def test_it_is_installed(command: list[str]) -> None:
     """By both of its names; nothing but the standard library is loaded for help."""
-    found = subprocess.run([*command, "robots"], text=True, capture_output=True, check=True)
+    found = subprocess.run(
+        [*command, "robots", "panda"], text=True, capture_output=True, check=True
+    )
     assert "panda: 7 arm joints, 2 fingers that open to " in found.stdout
 
 

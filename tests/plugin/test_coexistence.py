@@ -85,11 +85,9 @@ def test_values_of_ours_are_no_folders_with_conftests(pytester: pytest.Pytester)
     (tests / "test_it.py").write_text("def test_it(pytestconfig): assert pytestconfig.option\n")
     pytester.makeini("[pytest]\ntestpaths = tests\n")
     pytester.mkdir("out")
-    for arguments in (
-        ("--reps", "4"), ("--sim", "mujoco"), ("--sim-output", "out"),
-    ):  # fmt: skip
-        result = pytester.runpytest_subprocess(*arguments, "--their", "--collect-only")
-        result.stdout.fnmatch_lines(["*1 test collected*"])
+    words = "--reps 4 --sim mujoco --sim-output out --their --collect-only"
+    result = pytester.runpytest_subprocess(*words.split())
+    result.stdout.fnmatch_lines(["*1 test collected*"])
 
 
 def test_a_flag_of_a_conftest_before_a_path(pytester: pytest.Pytester) -> None:
@@ -116,16 +114,6 @@ def test_loaded_by_name(
     )
     result.assert_outcomes(passed=1)
     no_traceback(result)
-
-
-def test_without_pytest_benchmark(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(FALLING)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=2", "-p", "no:benchmark", "--strict-markers", "--sim-output=out"
-    )
-    result.assert_outcomes(passed=1)
-    no_traceback(result)
-    assert len(records(pytester.path / "out")) == 2
 
 
 def test_a_project_s_own_benchmark_fixture(pytester: pytest.Pytester) -> None:

@@ -54,12 +54,11 @@ def baseline(pytester: pytest.Pytester, saved: Path) -> Path:
 @pytest.mark.parametrize(
     "form",
     [
-        ["--sim-baseline=base"],
         ["--sim-baseline=base.json"],
         ["--benchmark-compare"],
         ["--sim-baseline=base/records.jsonl", "-n2"],
     ],
-    ids=["folder", "benchmark-json", "benchmark-compare", "xdist"],
+    ids=["benchmark-json", "benchmark-compare", "xdist"],
 )
 def test_a_worse_run_fails_with_one_sentence(
     pytester: pytest.Pytester, baseline: Path, monkeypatch: pytest.MonkeyPatch, form: list[str]

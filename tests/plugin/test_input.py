@@ -232,15 +232,3 @@ def test_unreadable_robot_description(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(
         ["*cannot read the robot description /nowhere/panda.urdf: No such file or directory*"]
     )
-
-
-def test_overlapping_cubes(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        """
-        from pytest_simbench.scene import Box, Pose, Scene
-        SIZE = (0.05, 0.05, 0.05)
-        SCENE = Scene("s", (Box("a", SIZE, Pose(), 0.1), Box("b", SIZE, Pose(), 0.1)))
-        """
-    )
-    result = pytester.runpytest_subprocess("--sim=mujoco")
-    result.stdout.fnmatch_lines(["*scene 's': 'a' and 'b' overlap by 50.0 mm; move one of them"])

@@ -27,10 +27,10 @@ def test_a_folder_with_a_run_is_refused_before_anything_runs(pytester: pytest.Py
     pytester.makepyfile(TEST)
     run(pytester, "--sim-output=o").assert_outcomes(passed=1)
     before = {path: path.read_bytes() for path in Path("o").rglob("*") if path.is_file()}
-    for arguments in (["--sim-output=o", "--sim-set=mujoco.timestep=0.004"], ["--sim-output=o/."]):
-        for more in ([], ["-n2"]):
-            result = run(pytester, *arguments, *more)
-            usage_error(result, "ERROR: *o already holds a run; complete that one with*")
+    for arguments in (["--sim-output=o", "--sim-set=mujoco.timestep=0.004"],
+                      ["--sim-output=o/.", "-n2"]):  # fmt: skip
+        result = run(pytester, *arguments)
+        usage_error(result, "ERROR: *o already holds a run; complete that one with*")
     assert {path: path.read_bytes() for path in before} == before
     # The ini file names a folder for every run: those that record nothing may go on.
     pytester.makeini("[pytest]\nsim_output = o\n")
@@ -91,7 +91,6 @@ SETTINGS = """
 @pytest.mark.parametrize(
     "arguments", [[], ["-n2"], ["--sim-jobs=2"]], ids=["plain", "xdist", "jobs"]
 )
-@pytest.mark.usefixtures("drawn")
 def test_each_setting_class_and_task_is_a_row_with_files_of_its_own(
     pytester: pytest.Pytester, arguments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -35,16 +35,14 @@ def settings(**changes: str) -> str:
 
 
 @typed
-@pytest.mark.parametrize("name", ["pytest.toml", "pyproject.toml"])
-def test_the_settings_of_the_page_with_strict(pytester: pytest.Pytester, name: str) -> None:
+def test_the_settings_of_the_page_with_strict(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         "from tests.tiny import Falling\n\ndef test_falling(repeat): repeat(Falling(0.1))"
     )
-    text = settings(sim_reps='"2"')
-    Path(name).write_text(text.replace("[pytest]", "[tool.pytest]") if "proj" in name else text)
+    Path("pytest.toml").write_text(settings(sim_reps='"2"'))
     result = pytester.runpytest_subprocess()
     result.assert_outcomes(passed=2)
-    result.stdout.fnmatch_lines(["configfile: " + name, "mujoco * of 2 *", "pybullet * of 2 *"])
+    result.stdout.fnmatch_lines(["configfile: pytest.toml", "mujoco * of 2 *", "pybullet * of 2 *"])
 
 
 @typed

@@ -30,8 +30,10 @@ TEST = """
 
 
 @pytest.fixture(autouse=True)
-def tasks_here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The inner pytest can import these tests' tasks, and finds no display."""
+def tasks_here(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, drawn: None
+) -> None:
+    """The inner pytest can import these tests' tasks, which draws in matplotlib, too."""
     monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))
 
 

@@ -69,19 +69,18 @@ def test_a_run_ends_with_its_page_and_the_answer(pytester: pytest.Pytester) -> N
     }
 
 
-def test_everything_is_told_with_v(pytester: pytest.Pytester) -> None:
-    output = run(pytester, "-v").stdout.str()
+def test_everything_is_told_with_v_and_a_badge_that_cannot_be_written(
+    pytester: pytest.Pytester,
+) -> None:
+    pytester.mkdir("badge.json")
+    result = run(pytester, "-v", "--sim-badge=badge.json")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["no badge: *badge.json could not be written (*"])
+    output = result.stdout.str()
     assert "where the time went" in output
     assert "declared deviations from the scene" in output
     assert output.index("did falling: 5") < output.index("where the time went")
     assert output.index("declared deviations") < output.index("\nreport: ")
-
-
-def test_a_badge_that_cannot_be_written_is_told(pytester: pytest.Pytester) -> None:
-    pytester.mkdir("badge.json")
-    result = run(pytester, "--sim-badge=badge.json")
-    result.assert_outcomes(passed=1)
-    result.stdout.fnmatch_lines(["no badge: *badge.json could not be written (*"])
 
 
 @pytest.mark.parametrize("where", ["command line", "ini", "environment"])

@@ -106,19 +106,6 @@ def test_an_arm_sags_as_its_spring_and_its_own_stop_at_the_keyframe(
     assert record.details["targets"] == pytest.approx({"rail": 0.1, "elbow": 0.2})
 
 
-@pytest.mark.engine
-def test_a_drive_that_is_no_spring_holds_a_keyframe(arm: Path, case: Case) -> None:
-    """Within the sag of a spring, 1.4 degrees. The kit asks all engines what their drives hold."""
-    task = Holding(read_scene_file(arm).scene, seconds=1.5)
-    with closing(LocalExecutor()) as executor:
-        record, _ = executor.repetition(Experiment(case_of(case, "pybullet"), task), 1).run()
-    assert record.ok, record.error
-    assert record.details["targets"] == pytest.approx({"rail": 0.1, "elbow": 0.2})
-    assert record.metrics["gone_hinges"] < 1.6
-    assert record.metrics["gone_sliders"] < 1.0
-    assert record.metrics["restless_hinges"] < 1.0
-
-
 def test_it_starts_at_the_keyframe() -> None:
     scene = replace(SCENE, starts=(Start((), (), (0.1, 0.2)),))
     robot = Holding(scene).scene(5, Jitter()).robot
