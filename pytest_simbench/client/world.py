@@ -315,6 +315,12 @@ class World:
             trace, phases = self._saved[name]
             self.trace, self.phases = [*trace], [*phases]
 
+    def misfit(self, *names: str) -> float:
+        """How far from where the scene has it the face of a body touches, at most [m]: what the
+        engine makes of its size and margin, as it was read back when the world was loaded."""
+        misfit: float = self.process.request("misfit", names=list(names))
+        return misfit
+
     def contact_count(self) -> int:
         return int(self.process.request("contact_count"))
 

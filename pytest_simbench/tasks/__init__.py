@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.goals import GoalTask, PickAndPlace, PushingToGoal, Reaching
     from pytest_simbench.tasks.holding import Holding
     from pytest_simbench.tasks.impacting import Impacting
+    from pytest_simbench.tasks.inserting import Inserting, Oversized
     from pytest_simbench.tasks.nesting import Nesting
     from pytest_simbench.tasks.pouring import Pouring
     from pytest_simbench.tasks.pushing import CurvePushing, Pushing
@@ -27,9 +28,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArmFollowing", "ArmPushing", "Carrying", "CorrectedArmFollowing", "CurvePushing", "Fitting",
-    "GoalTask", "Holding", "Impacting", "Jitter", "LeaningTowers", "Log", "Moment", "Nesting",
-    "Outcome", "PickAndPlace", "Pouring", "Pushing", "PushingToGoal", "Reaching", "Replaying",
-    "Settling", "Slipping", "Stacking", "Task", "Throwing", "Tossing", "rests_on",
+    "GoalTask", "Holding", "Impacting", "Inserting", "Jitter", "LeaningTowers", "Log", "Moment",
+    "Nesting", "Outcome", "Oversized", "PickAndPlace", "Pouring", "Pushing", "PushingToGoal",
+    "Reaching", "Replaying", "Settling", "Slipping", "Stacking", "Task", "Throwing", "Tossing",
+    "rests_on",
 ]  # fmt: skip
 
 _MODULES = {
@@ -41,6 +43,7 @@ _MODULES = {
     "goals": ("GoalTask", "PickAndPlace", "PushingToGoal", "Reaching"),
     "holding": ("Holding",),
     "impacting": ("Impacting",),
+    "inserting": ("Inserting", "Oversized"),
     "nesting": ("Nesting",),
     "pouring": ("Pouring",),
     "pushing": ("CurvePushing", "Pushing"),
