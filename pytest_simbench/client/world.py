@@ -316,8 +316,8 @@ class World:
             self.trace, self.phases = [*trace], [*phases]
 
     def misfit(self, *names: str) -> float:
-        """How far from where the scene has it the face of a body touches, at most [m]: what the
-        engine makes of its size and margin, as it was read back when the world was loaded."""
+        """How far from where the scene has it one of these bodies touches others, at most [m],
+        across its own z axis: what the engine made of its size and margin when it loaded it."""
         misfit: float = self.process.request("misfit", names=list(names))
         return misfit
 

@@ -101,11 +101,10 @@ def check(
 
 
 def misfit(expected: Mapping[str, Any], reported: Mapping[str, Any], body: str) -> float:
-    """How far from where the scene has it the faces of a body touch [m]: by its shapes' sizes, and
-    by their margins. What the engine does not tell counts as right."""
-    faces = np.abs(DIRECTIONS).max(axis=1) == 1.0
-    names = [f"body/{body}/{kind}" for kind in OUTLINES]
-    gaps = [_gap(expected[n][:, faces], reported[n][:, faces]) for n in names if n in reported]
+    """How far from where the scene has it a body touches others [m], across its own z axis: by its
+    shapes' reach, and by their margins. What the engine does not tell counts as right."""
+    names, across = [f"body/{body}/{kind}" for kind in OUTLINES], DIRECTIONS[:, 2] == 0.0
+    gaps = [_gap(expected[n][:, across], reported[n][:, across]) for n in names if n in reported]
     margin = np.abs(reported.get(f"body/{body}/margin", 0.0)).max()
     return max((gap for gap in gaps if gap is not None), default=0.0) + float(margin)
 
