@@ -1,9 +1,13 @@
 """A contact task: an arm picks up a peg and inserts it into a hole. Does it get in?
 
-Geometry: a peg that is smaller than the hole gets in, a larger one never does. The arm aims beside
-the hole, by less than the chamfer is wide, and its drives are so soft that the peg gives way
-sideways (Whitney 1982: lateral compliance). When a leaning peg wedges or jams is asked without an
-arm, by `laws.insertion`.
+Geometry: a peg that is smaller than the hole gets in, a larger one never does. The arm looks once
+at how the peg hangs in the hand, sets it upright over the hole, and aims beside its middle by less
+than the gap, so nothing has to touch. What touches gives way, for the drives are soft (Whitney
+1982: lateral compliance). When a leaning peg wedges or jams is asked without an arm, by
+`laws.insertion`.
+
+The chamfer is not aimed at: a spring in each joint yields outwards when the tool is pushed up, so
+that a peg which is pressed on the far chamfer may well stay there.
 
 Where an engine's own shapes differ from the scene's by a good part of the clearance, it is asked
 another question. So a clearance is judged from `JUDGED` times what engine and facets add to it.
@@ -52,11 +56,10 @@ PEG, HOLE = (0.45, -0.15), (0.45, 0.15)
 HIGH, THICK, CHAMFER = 0.04, 0.02, 0.004
 """Height and thickness of the walls, and width of their chamfer of 45 degrees [m]."""
 
-ASIDE = 0.0005
-"""By which the arm aims beside the hole at most, in x and in y [m]: an eighth of the chamfer. With
-the stiffness it makes 0.7 N on the end of the peg, a third of what turns it between the pads."""
+ASIDE = 0.25
+"""By which share of the clearance the arm aims beside the hole at most, in x and in y."""
 
-ABOVE, STEP, SLOW = 0.005, 0.002, 0.1
+ABOVE, STEP, SLOW = 0.005, 0.002, 0.3
 """From where the peg is lowered, above the chamfer, and how far at a time [m]; at which share of
 the joints' speed limits."""
 
@@ -190,7 +193,7 @@ class Inserting(Task):
                     f"shapes and the facets of the hole make {1000 * added:.2g} mm",
                 ),
             )
-        aside = Randomness.of(seed).order.uniform(-ASIDE, ASIDE, 2)
+        aside = ASIDE * abs(self.clearance) * Randomness.of(seed).order.uniform(-1.0, 1.0, 2)
         hand = Manipulator(world, Randomness.of(seed).planner)
         reasons: list[str] = []
         forces: list[float] = []
@@ -202,8 +205,10 @@ class Inserting(Task):
                 x, y = np.add(HOLE, aside).tolist()
                 aim = Pose.at(x, y, HIGH + CHAMFER + ABOVE + LONG / 2)
                 hand.bring(aim)
-                off = np.subtract(aim.position, world.pose("peg").position).tolist()
-                hand.move_straight(hand.tool.translated(*off), speed=SLOW)
+                seen = world.pose("peg")
+                quarter = round(2 * seen.yaw / math.pi) * math.pi / 2
+                turn = Pose.at(0.0, 0.0, 0.0, yaw=quarter if self.section == "square" else seen.yaw)
+                hand.move_straight(aim * turn * seen.inverse() * hand.tool, speed=SLOW)
             with world.phase("insert"):
                 self.lower(hand, forces)
             rest(world, 2 * RESTLESS, "hold")

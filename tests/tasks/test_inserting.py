@@ -75,13 +75,19 @@ def test_a_perfect_arm_inserts(section: Section) -> None:
         {"inserted": 1.0, "depth": 25.0, "overlap": 0.0, "force": 5.0}, abs=1e-3
     )
     assert outcome.reasons == ()
-    assert np.abs(outcome.details["aside"]).max() < ASIDE
+    assert 0.0 < np.abs(outcome.details["aside"]).max() < ASIDE * 2e-3 <= 2e-3 / 2
+
+
+def test_what_slipped_before_the_look_is_made_up_for() -> None:
+    outcome = inserted(Inserting(clearance=2e-3), Mishap("bring", 0.2, slip(x=0.003, y=0.002)))
+    assert outcome.metrics["inserted"] == 1.0
+    assert outcome.metrics["overlap"] == 0.0
 
 
 def test_what_stands_in_a_wall_and_what_falls_are_told() -> None:
-    outcome = inserted(Inserting(clearance=1e-4), seed=3)
+    outcome = inserted(Oversized())
     beside = 1000 * np.abs(outcome.details["aside"]).max()
-    assert outcome.metrics["overlap"] == pytest.approx(beside - 0.05, abs=1e-3)
+    assert outcome.metrics["overlap"] == pytest.approx(0.5 + beside, abs=1e-3)
     short = inserted(Inserting(clearance=2e-3), Mishap("insert", 0.1, slip(z=-0.01)))
     assert (short.metrics["inserted"], short.metrics["depth"]) == (0.0, pytest.approx(15, abs=1e-3))
     fallen = inserted(Inserting(), Mishap("bring", 0.2, slip(z=-0.05)))
