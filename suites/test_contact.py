@@ -1,10 +1,12 @@
-"""Hold and carry, pour, nest, open: does what the fingers hold stay there, are balls conserved, do
-bowls rest in each other, does a drawer take the work of its friction?
+"""Hold and carry, insert, pour, nest, open: does what the fingers hold stay there, do pegs get in,
+are balls conserved, do bowls rest in each other, does a drawer take the work of its friction?
 
     pytest suites/test_contact.py --sim=all --reps=20
 
 What weighs 0.8 of what two pads hold by friction is carried, shaken and held still; what weighs
 1.25 of it slips out (docs/contact.md). A pad that lets go, and one that glues, both fail.
+A peg that is smaller than the hole gets in, and a larger one does not. Rows that differ in their
+clearance alone tell where an engine begins to jam, and where to penetrate.
 Balls that are poured into a tray are all in it at the end. Nested bowls stand as high as their
 walls say. A drawer is pulled by 15 cm with its friction, and stays where it is let go.
 """
@@ -13,10 +15,19 @@ from typing import get_args
 
 import pytest
 
-from pytest_simbench.tasks import Carrying, Nesting, Opening, Pouring, Slipping
+from pytest_simbench.tasks import (
+    Carrying,
+    Inserting,
+    Nesting,
+    Opening,
+    Oversized,
+    Pouring,
+    Slipping,
+)
 from pytest_simbench.tasks.carrying import Shape
+from pytest_simbench.tasks.inserting import Section
 
-SHAPES = get_args(Shape)
+SHAPES, SECTIONS = get_args(Shape), get_args(Section)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -33,6 +44,30 @@ def test_slips(repeat, threshold):
     result = repeat(Slipping())
     result.assert_crashed_at_most(threshold("crashed", 0.15))
     result.assert_at_most("held", threshold("held", 0.2))
+
+
+def judged(result):
+    """Skip with the reason where an engine's shapes leave too little of the clearance."""
+    if not result.values("inserted"):
+        pytest.skip(result.records[0].reasons[0])
+    return result
+
+
+@pytest.mark.parametrize("clearance", [2e-3, 1e-3, 5e-4, 2e-4, 1e-4], ids="{:g}".format)
+@pytest.mark.parametrize("section", SECTIONS)
+def test_inserts(repeat, threshold, section, clearance):
+    result = judged(repeat(Inserting(section, clearance)))
+    result.assert_crashed_at_most(threshold("crashed", 0.15))
+    result.assert_at_least("inserted", threshold("inserted", 0.8))
+    result.assert_at_most("overlap", threshold("overlap", 0.1))
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_keeps_out(repeat, threshold, section):
+    result = judged(repeat(Oversized(section)))
+    result.assert_crashed_at_most(threshold("crashed", 0.15))
+    result.assert_at_most("inserted", threshold("inserted", 0.2))
+    result.assert_at_most("overlap", threshold("overlap", 0.1))
 
 
 @pytest.mark.parametrize("balls", [10, 30, 100])

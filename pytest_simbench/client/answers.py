@@ -78,6 +78,7 @@ ANSWERS: dict[str, Any] = {
     "watch": None,
     "read_again": None,
     "read_back": dict[str, Any],
+    "misfit": float,
     "state": State,
     "follow": Moved,
     "wait": Moved,

@@ -315,6 +315,12 @@ class World:
             trace, phases = self._saved[name]
             self.trace, self.phases = [*trace], [*phases]
 
+    def misfit(self, *names: str) -> float:
+        """How far from where the scene has it one of these bodies touches others, at most [m],
+        across its own z axis: what the engine made of its size and margin when it loaded it."""
+        misfit: float = self.process.request("misfit", names=list(names))
+        return misfit
+
     def contact_count(self) -> int:
         return int(self.process.request("contact_count"))
 

@@ -7,7 +7,7 @@ from pytest_simbench.records.phenomena import PHENOMENA
 
 _MODULES = (
     "free", "contact", "impact", "sticking", "sliding", "rolling", "hands", "joints", "drives",
-    "loops", "domino", "loads",
+    "loops", "domino", "loads", "insertion",
 )  # fmt: skip
 """In the order in which tables name the laws of a phenomenon."""
 

@@ -248,6 +248,7 @@ OTHER: dict[str, dict[str, Any]] = {
     "pendulum_period": {"length": 0.4, "angle": 1.5}, "step_response": {"rate": 8.0},
     "spring_damper": {"start": 0.4}, "effort_limit": {"effort": 1.5}, "tracking": _FASTER,
     "sag": {"stiffness": 60.0}, "feed_forward": {"stiffness": 60.0},
+    "wedging": {"friction": 0.4}, "jamming": {"depth": 0.08},
 }  # fmt: skip
 """Other parameters by law, none where it stays as it is: who chooses settings on laws judges them
 on the same laws at others."""

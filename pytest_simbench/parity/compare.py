@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.shapes import OUTLINES
+from pytest_simbench.description.shapes import DIRECTIONS, OUTLINES
 from pytest_simbench.ground.errors import ParityError
 from pytest_simbench.parity.quantities import constants
 from pytest_simbench.scene import Scene
@@ -98,6 +98,15 @@ def check(
             + more
         )
     return list(comparison.deviations)
+
+
+def misfit(expected: Mapping[str, Any], reported: Mapping[str, Any], body: str) -> float:
+    """How far from where the scene has it a body touches others [m], across its own z axis: by its
+    shapes' reach, and by their margins. What the engine does not tell counts as right."""
+    names, across = [f"body/{body}/{kind}" for kind in OUTLINES], DIRECTIONS[:, 2] == 0.0
+    gaps = [_gap(expected[n][:, across], reported[n][:, across]) for n in names if n in reported]
+    margin = np.abs(reported.get(f"body/{body}/margin", 0.0)).max()
+    return max((gap for gap in gaps if gap is not None), default=0.0) + float(margin)
 
 
 def _sentence(deviation: Deviation, untold: bool, differing: str | None) -> str:

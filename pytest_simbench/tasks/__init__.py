@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from pytest_simbench.tasks.goals import GoalTask, PickAndPlace, PushingToGoal, Reaching
     from pytest_simbench.tasks.holding import Holding
     from pytest_simbench.tasks.impacting import Impacting
+    from pytest_simbench.tasks.inserting import Inserting, Oversized
     from pytest_simbench.tasks.nesting import Nesting
     from pytest_simbench.tasks.opening import Opening
     from pytest_simbench.tasks.pouring import Pouring
@@ -28,9 +29,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArmFollowing", "ArmPushing", "Carrying", "CorrectedArmFollowing", "CurvePushing", "Fitting",
-    "GoalTask", "Holding", "Impacting", "Jitter", "LeaningTowers", "Log", "Moment", "Nesting",
-    "Opening", "Outcome", "PickAndPlace", "Pouring", "Pushing", "PushingToGoal", "Reaching",
-    "Replaying", "Settling", "Slipping", "Stacking", "Task", "Throwing", "Tossing", "rests_on",
+    "GoalTask", "Holding", "Impacting", "Inserting", "Jitter", "LeaningTowers", "Log", "Moment",
+    "Nesting", "Opening", "Outcome", "Oversized", "PickAndPlace", "Pouring", "Pushing",
+    "PushingToGoal", "Reaching", "Replaying", "Settling", "Slipping", "Stacking", "Task",
+    "Throwing", "Tossing", "rests_on",
 ]  # fmt: skip
 
 _MODULES = {
@@ -42,6 +44,7 @@ _MODULES = {
     "goals": ("GoalTask", "PickAndPlace", "PushingToGoal", "Reaching"),
     "holding": ("Holding",),
     "impacting": ("Impacting",),
+    "inserting": ("Inserting", "Oversized"),
     "nesting": ("Nesting",),
     "opening": ("Opening",),
     "pouring": ("Pouring",),

@@ -84,6 +84,16 @@ class Manipulator(Arm):
     def place(self, target: Pose) -> None:
         """Bring the held body to `target` [pose of its centre] and let it go there.
 
+        Raises:
+            PlanningError: the place cannot be reached.
+            LostBody: it fell on the way.
+        """
+        self.bring(target)
+        self.open_hand()
+
+    def bring(self, target: Pose) -> None:
+        """Bring the held body to `target` [pose of its centre] from above.
+
         It may be turned about its own z axis by what leaves its shape as it is: a cube by quarters.
         Where it slipped in the hand it is not corrected for: that error is the simulator's.
 
@@ -99,7 +109,6 @@ class Manipulator(Arm):
         self.go_to(above, speed=self.speeds.carry)
         self.check_held()
         self.move_straight(down, speed=self.speeds.contact)
-        self.open_hand()
 
     def throw(
         self, goal: FloatArray, fraction: float, *, feasible: bool

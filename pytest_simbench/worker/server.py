@@ -25,7 +25,7 @@ import numpy as np
 from pytest_simbench import __version__
 from pytest_simbench.description.links import check_names
 from pytest_simbench.description.robot_files import received
-from pytest_simbench.parity.compare import check
+from pytest_simbench.parity.compare import check, misfit
 from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.parity.readback import remembering
 from pytest_simbench.scene import Scene, Trajectory
@@ -205,6 +205,10 @@ class Server:
         watch = self._loaded().watch
         if watch is not None:
             watch.read()
+
+    def do_misfit(self, names: list[str]) -> float:
+        """The largest of some bodies' (`parity.compare.misfit`), if the world was compared."""
+        return max(misfit(*self.compared, name) for name in names) if self.compared else 0.0
 
     def do_read_back(self, remember: dict[str, Any] | None = None) -> dict[str, Any]:
         """What the engine says; the adapter made to remember another scene meanwhile, if given."""

@@ -84,7 +84,7 @@ class ReadBack(readback.ReadBack):
         return {
             "friction": dynamics[1] ** 2,
             "restitution": dynamics[5] ** 2,
-            "margin": dynamics[11] - self._thickness(part),
+            "margin": dynamics[11] - self._within(part, dynamics[11]),
         }
 
     def inertial(self, part: Part) -> dict[str, Any]:
@@ -113,13 +113,16 @@ class ReadBack(readback.ReadBack):
                 corners = np.reshape(mesh[1], (-1, 3)) if mesh[0] else np.full((1, 3), np.nan)
                 yield a_mesh(corners, inertial)
 
-    def _thickness(self, part: Part) -> float:
-        """Radius of a sphere or capsule, which are a point and a line to Bullet, their margin the
-        rest [m]; else 0."""
+    def _within(self, part: Part, margin: float) -> float:
+        """What of a margin is no distance from the shape [m]: the radius of a sphere or capsule,
+        which are a point and a line to Bullet, and all of a box or cylinder, which has it within
+        its faces."""
         data = self._shapes(part)
         kind, size, _, place, turn = data[0][2:7]
         if len(data) > 1 or any([*place, *turn[:3]]):  # Bullet tells the margin of the compound
             return 0.0
+        if kind in (pybullet.GEOM_BOX, pybullet.GEOM_CYLINDER):
+            return margin
         if kind == pybullet.GEOM_SPHERE:
             return float(size[0])
         return float(size[1]) if kind == pybullet.GEOM_CAPSULE else 0.0

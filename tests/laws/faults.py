@@ -126,6 +126,7 @@ FAULTS: dict[str, Fault] = {
     "dead_collision": bodies(lambda body: replace(body, mass=3 * body.mass), "two"),
     "collision_momentum": rougher(1.0),
     **dict.fromkeys(("stick_angle_x", "stick_angle_y", "stick_angle_diagonal"), rougher(1.2)),
+    **dict.fromkeys(("wedging", "jamming"), rougher(1.2)),
     "creep": rougher(0.7),
     "carried": rougher(0.2),
     **dict.fromkeys(("slide_x", "slide_y", "slide_diagonal", "belt"), rougher(1.2)),

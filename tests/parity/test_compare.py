@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pytest_simbench.description.shapes import DIRECTIONS
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.parity.compare import check, compare
+from pytest_simbench.parity.compare import check, compare, misfit
 from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import Cylinder, Gripper, Pose, Scene
 from pytest_simbench.simulator import FOLLOWER, Deviation, ParityError
@@ -178,3 +179,15 @@ def test_some_deviations_count_only_where_a_scene_has_their_word() -> None:
     assert [rolling.concerns(scene) for scene in scenes] == [False, True, True]
     assert all(Deviation("", "always").concerns(scene) for scene in scenes)
     assert Scene("s", (can.changed(linear_damping=0.1),)).words == {"cylinder", "damping"}
+
+
+def test_a_body_touches_elsewhere_by_its_reach_and_its_margin_across() -> None:
+    upright = np.zeros((1, 26))
+    expected = {"body/peg/boxes": upright, "body/peg/margin": 0.0}
+    grown = upright.copy()
+    grown[0, DIRECTIONS[:, 2] == 0.0] -= 1e-4
+    grown[0, DIRECTIONS[:, 2] > 0.9] += 1.0  # it is longer, too, which leaves its width
+    assert misfit(expected, {"body/peg/boxes": grown}, "peg") == pytest.approx(1e-4)
+    told = {"body/peg/boxes": grown, "body/peg/margin": 1e-3}
+    assert misfit(expected, told, "peg") == pytest.approx(1.1e-3)
+    assert misfit(expected, {}, "peg") == 0.0

@@ -62,7 +62,7 @@ def test_each_row_names_a_simulator_its_cost_who_is_wrong_and_the_page(need: str
         ("hold in a hand", 3, ["grasping"]),
         ("free flight, tumbling", 14, ["free motion"]),
         ("impacts, bounces", 9, ["impact"]),
-        ("friction, sliding", 15, ["sliding", "sticking"]),
+        ("friction, sliding", 17, ["sliding", "sticking"]),
         ("rolling", 7, ["rolling"]),
         ("springs, force limits", 15, ["joints"]),
     ],

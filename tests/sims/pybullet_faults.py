@@ -68,7 +68,7 @@ FAULTS: dict[str, Plant] = {
     "ground/height": call(
         "resetBasePositionAndOrientation", lambda s: s._ground, [0, 0, 0.01], [0, 0, 0, 1]
     ),
-    "body/cube/margin": bullet("cube", collisionMargin=0.005),
+    "body/wedge/margin": bullet("wedge", collisionMargin=0.005),
     "body/cube/com": com,
     "body/cube/dynamic": call("createConstraint", lambda s: s._bodies["cube"], *HELD),
     "link/panda_link4/restitution": bullet("robot", "panda_link4", restitution=0.5),
