@@ -8,11 +8,29 @@ from tables import NAMES, Kept, Line, numbers, table
 
 from pytest_simbench.records.metrics import Metric, significant
 from pytest_simbench.records.record import Record
-from pytest_simbench.tasks import Carrying, Nesting, Pouring, Slipping
+from pytest_simbench.tasks import (
+    Carrying,
+    Inserting,
+    Nesting,
+    Opening,
+    Oversized,
+    Pouring,
+    Slipping,
+    Task,
+)
 
-TASKS = {task.name: task for task in (Carrying(), Slipping(), Pouring(), Nesting())}
-CASES = {"carrying": "shape", "slipping": "shape", "pouring": "balls", "nesting": "bowls"}
-"""The parameter by which the repetitions of a task differ."""
+CASES: dict[Task, tuple[str, ...]] = {
+    Carrying(): ("shape",),
+    Slipping(): ("shape",),
+    Inserting(): ("section", "clearance"),
+    Oversized(): ("section", "clearance"),
+    Pouring(): ("balls",),
+    Nesting(): ("bowls",),
+    Opening(): ("friction",),
+}
+"""The parameters by which the repetitions of a task differ."""
+
+TASKS = {task.name: task for task in CASES}
 
 METRICS = {metric.name: metric for task in TASKS.values() for metric in task.metrics}
 COSTS = ("cpu_cost", "ram_peak")
@@ -21,8 +39,9 @@ COSTS = ("cpu_cost", "ram_peak")
 def _told(record: Record) -> dict[str, object] | None:
     if record.task not in TASKS or record.robot.get("name", "panda") != "panda":
         return None
-    case = record.settings[f"task.{CASES[record.task]}"]
-    return {"case": str(case), **record.metrics, **{name: record.cost(name) for name in COSTS}}
+    given = [record.settings[f"task.{name}"] for name in CASES[TASKS[record.task]]]
+    case = " ".join(f"{one:g}" if isinstance(one, float) else str(one) for one in given)
+    return {"case": case, **record.metrics, **{name: record.cost(name) for name in COSTS}}
 
 
 CONTACT = Kept(
