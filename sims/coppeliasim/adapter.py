@@ -48,7 +48,7 @@ class CoppeliaSim(Simulator):
         engine="Bullet, ODE, Newton Dynamics, MuJoCo",
         language="C++",
         tested_version="4.10.0",
-        capabilities=Capability.named("contact_count deterministic"),
+        capabilities=Capability.named("contact_count contact_forces deterministic"),
         deviations=(
             Deviation("body/*/margin link/*/margin", "the program tells no margin of shapes"),
             Deviation(
@@ -82,11 +82,7 @@ class CoppeliaSim(Simulator):
     def load(self, scene: Scene) -> None:
         self.begin(scene)
         s = self.settings
-        if self.info.no_program:
-            raise UnavailableError(self.info.no_program)
-        program.check_engine(s.engine)
-        program.start()
-        self._started = True
+        self._start()
         build.set_engine(s, scene.gravity)
         self._surface = surface = Surface(s)
         shapes = build.Shapes()
@@ -105,6 +101,16 @@ class CoppeliaSim(Simulator):
         shapes.close()
         self._goals = np.empty((0, 13))
         self._step = program.stepper(s.timestep)
+
+    def _start(self) -> None:
+        """Start the program, once."""
+        if self._started:
+            return
+        if self.info.no_program:
+            raise UnavailableError(self.info.no_program)
+        program.check_engine(self.settings.engine)
+        program.start()
+        self._started = True
 
     def read_back(self) -> dict[str, Any]:
         return ReadBack(self).all()
@@ -140,7 +146,7 @@ class CoppeliaSim(Simulator):
         state = np.empty((len(self._free), 13))
         for row, part in zip(state, self._free, strict=True):
             row[:7] = part.pose().as_array()
-            row[7:10], row[10:] = part.velocity() if self._steps else part.thrown()
+            row[7:10], row[10:] = part.velocity() if self._steps else self._surface.thrown(part)
         return state
 
     def joint_state(self) -> FloatArray:
@@ -148,6 +154,14 @@ class CoppeliaSim(Simulator):
 
     def contact_count(self) -> int:
         return sum(1 for _ in self._contacts())
+
+    def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
+        names = {self._ground.handle: "ground"}
+        for kind, parts in (("body", self._bodies), ("link", self._links)):
+            names |= {part.handle: f"{kind}/{name}" for name, part in parts.items()}
+        for (first, second), row in self._contacts():
+            wrench = np.concatenate([row[3:], np.cross(row[:3], row[3:])])
+            yield names[first], names[second], wrench
 
     def _contacts(self) -> Iterator[tuple[tuple[int, int], FloatArray]]:
         """Of the last step: two shapes' handles; point [m] and force [N] of each contact, (6,)."""
@@ -165,4 +179,5 @@ class CoppeliaSim(Simulator):
             program.end()
 
     def versions(self) -> dict[str, str]:
-        return {self.info.distribution: program.version()} if self._started else {}
+        self._start()  # none but the running program tells
+        return {self.info.distribution: program.version()}

@@ -96,7 +96,12 @@ def library() -> Any:
             f"{path} has no {NEEDED}: it is of a CoppeliaSim older than 4.10; install that"
         )
     found._simGetObject.restype = ctypes.c_void_p
-    for name in ("simGetLastError", "simGetStringProperty", "simGetFloatArrayProperty"):
+    for name in (
+        "simGetLastError",
+        "simGetStringProperty",
+        "simGetFloatArrayProperty",
+        "simGetIntArrayProperty",
+    ):
         getattr(found, name).restype = ctypes.c_void_p
     return found
 
@@ -226,15 +231,23 @@ def set_floats(handle: int, name: str, values: Sequence[float] | FloatArray) -> 
 
 
 def get_floats(handle: int, name: str) -> FloatArray:
+    return np.array(_array("simGetFloatArrayProperty", ctypes.c_double, handle, name))
+
+
+def _array(function: str, kind: Any, handle: int, name: str) -> list[Any]:
     count = ctypes.c_int()
-    found = library().simGetFloatArrayProperty(
+    found = getattr(library(), function)(
         ctypes.c_longlong(handle), name.encode(), ctypes.byref(count)
     )
     if not found:
         raise SimulatorError(f"CoppeliaSim has no property {name}: {last_error()}")
-    values = np.array((ctypes.c_double * count.value).from_address(found))
+    values = list((kind * count.value).from_address(found))
     library().simReleaseBuffer(ctypes.c_void_p(found))
     return values
+
+
+def get_integers(handle: int, name: str) -> tuple[int, ...]:
+    return tuple(_array("simGetIntArrayProperty", ctypes.c_int, handle, name))
 
 
 def set_vector(handle: int, name: str, values: Sequence[float] | FloatArray) -> None:
@@ -263,9 +276,20 @@ def get_pose(handle: int) -> Pose:
     """Of an object, in the world; the program has quaternions x, y, z, w."""
     found = doubles([0.0] * 7)
     call("simGetObjectPose_D", handle, NONE, found)
+    return _pose(found)
+
+
+def _pose(found: Any) -> Pose:
     return Pose.from_array([*found[:3], found[6], *found[3:6]])
 
 
 def set_pose(handle: int, pose: Pose) -> None:
     w, x, y, z = pose.quaternion
     call("simSetObjectPose_D", handle, NONE, doubles([*pose.position, x, y, z, w]))
+
+
+def local_pose(handle: int) -> Pose:
+    """Of an object, in what it hangs on, a joint at zero."""
+    found = doubles([0.0] * 7)
+    call("simGetPoseProperty", ctypes.c_longlong(handle), b"pose", found)
+    return _pose(found)

@@ -36,6 +36,7 @@ from .library import (
     get_vector,
     integers,
     library,
+    local_pose,
 )
 from .world import CAPSULE, CUBOID, CYLINDER, REVOLUTE, SPHEROID, Part
 
@@ -77,8 +78,8 @@ class ReadBack(readback.ReadBack):
     def body(self, part: Part, name: str) -> dict[str, Any]:
         if not get_bool(part.handle, "dynamic"):
             return {"dynamic": 0.0}
-        started = [get_vector(part.handle, f"init{w}Velocity") for w in ("Linear", "Angular")]
-        return {"dynamic": 1.0, "velocity": np.concatenate(started), **self.inertial(part)}
+        started = np.concatenate(self.surfaces.thrown(part))
+        return {"dynamic": 1.0, "velocity": started, **self.inertial(part)}
 
     def pose(self, part: Part) -> FloatArray:
         return part.pose().as_array()
@@ -163,7 +164,7 @@ class ReadBack(readback.ReadBack):
             "axis": self._motion(handle, drives.child(k)),
             "limits": [interval[0], interval[0] + interval[1]],
             "initial_position": drives.position(k),
-            "effort_limit": force.value,
+            "effort_limit": abs(force.value),  # its sign is the speed's
             **dict.fromkeys(("stiffness", "damping", "armature", "friction"), 0.0),
         }
         if self.engine == "mujoco":
@@ -180,7 +181,8 @@ class ReadBack(readback.ReadBack):
 
     def _motion(self, handle: int, child: Part) -> FloatArray:
         """Velocity of the child's frame at unit joint speed, in that frame: angular, linear."""
-        frame: Pose = child.pose().inverse() * get_pose(handle)
+        # By where the child was put: an engine lets bodies drift from their joints.
+        frame: Pose = (local_pose(child.handle) * child.frame).inverse()
         direction = frame.rotation()[:, 2]
         if get_int(handle, "jointType") != REVOLUTE:
             return np.concatenate([np.zeros(3), direction])

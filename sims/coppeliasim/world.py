@@ -49,15 +49,6 @@ from .library import (
 )
 from .settings import CoppeliaSimSettings
 
-ITERATIONS = {
-    "bullet": "bullet.iterations",
-    "bullet283": "bullet.iterations",
-    "ode": "ode.quickStepIterations",
-    "newton": "newton.iterations",
-    "mujoco": "mujoco.iterations",
-}
-"""Properties of the scene."""
-
 CUBOID, SPHEROID, CYLINDER, CAPSULE = 3, 4, 5, 8
 """Kinds of primitive shapes (simConst.h)."""
 
@@ -79,8 +70,11 @@ GROUND_SIZE = (20.0, 20.0, 1.0)
 CARRIER = 0.01
 """Edge of the block that stands for a link without shapes, and touches nothing [m]."""
 
-TRIES = 200
+TRIES = 100
 """Shapes that may be made until one lies behind all others in memory."""
+
+FILLERS = 20_000
+"""Small shapes that may be made to fill the gaps in memory before them."""
 
 
 @dataclass(frozen=True)
@@ -106,11 +100,6 @@ class Part:
         linear, angular = doubles([0.0] * 3), doubles([0.0] * 3)
         call("simGetVelocity_D", self.handle, linear, angular)
         return np.array(linear), np.array(angular)
-
-    def thrown(self) -> tuple[FloatArray, FloatArray]:
-        """The same before the first step."""
-        linear, angular = "initLinearVelocity", "initAngularVelocity"
-        return get_vector(self.handle, linear), get_vector(self.handle, angular)
 
     def weight(self) -> tuple[float, FloatArray, FloatArray]:
         """Mass [kg], its centre (3,) [m] and the inertia about it (3, 3) [kg m^2], in the shape's
@@ -151,7 +140,15 @@ class Shapes:
                 self._last = address(handle)
                 return handle
             self._rejected.append(handle)
+            self._fill()
         raise SimulatorError(f"CoppeliaSim made {TRIES} shapes and none behind the last in memory")
+
+    def _fill(self) -> None:
+        """Fill gaps in memory, until a shape lies behind the last one."""
+        for _ in range(FILLERS):
+            self._rejected.append(_primitive(CUBOID, (CARRIER,) * 3))
+            if address(self._rejected[-1]) > self._last:
+                return
 
     def close(self) -> None:
         """Take off the scene what was made in vain."""
@@ -203,6 +200,14 @@ class Surface:
         for kind, value in zip(("linear", "angular"), damping, strict=True):
             set_float(handle, f"{family}.{kind}{suffix}", float(1 - np.exp(-value * period)))
 
+    def thrown(self, part: Part) -> tuple[FloatArray, FloatArray]:
+        """Of a body before the first step: linear [m/s] and angular velocity [rad/s], (3,) each."""
+        linear = get_vector(part.handle, "initLinearVelocity")
+        angular = get_vector(part.handle, "initAngularVelocity")
+        if self.engine == "mujoco":
+            angular = get_pose(part.handle).rotation() @ angular
+        return linear, angular
+
     def damping(self, handle: int) -> FloatArray:
         """As of `damp`."""
         if self.engine == "mujoco":
@@ -229,9 +234,9 @@ def set_engine(s: CoppeliaSimSettings, gravity: Sequence[float]) -> None:
     set_float(SCENE, "timeStep", s.timestep)
     set_float(SCENE, "dynamicsStepSize", s.timestep)
     set_vector(SCENE, "gravity", gravity)
-    if s.iterations:
-        set_int(SCENE, ITERATIONS[s.engine], s.iterations)
     set_int(SCENE, "mujoco.cone", CONES.index(s.cone))
+    set_floats(SCENE, "mujoco.kinematicWeldSolref", s.solref)
+    set_floats(SCENE, "mujoco.kinematicWeldSolimp", [*s.solimp, *SIGMOID])
 
 
 def add_ground(shapes: Shapes, surface: Surface, friction: float, restitution: float) -> Part:
@@ -259,7 +264,10 @@ def add_body(shapes: Shapes, surface: Surface, body: Body) -> Part:
         set_bool(handle, "dynamic", True)
         surface.damp(handle, np.asarray(body.damping))
         set_vector(handle, "initLinearVelocity", body.linear_velocity)
-        set_vector(handle, "initAngularVelocity", body.angular_velocity)
+        turning = np.asarray(body.angular_velocity)
+        if surface.engine == "mujoco":  # takes it in the body's axes
+            turning = part.frame.rotation() @ body.pose.rotation().T @ turning
+        set_vector(handle, "initAngularVelocity", turning)
     elif body.prescribed:
         set_bool(handle, "kinematic", True)
     part.put(body.pose)

@@ -39,7 +39,9 @@ def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_no_program(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert missing(CoppeliaSim.info) is None
     (root / library.LIBRARY).unlink()
-    told = f"coppeliasim is not here (COPPELIASIM_ROOT_DIR is {root}, which has no {library.LIBRARY}"
+    told = (
+        f"coppeliasim is not here (COPPELIASIM_ROOT_DIR is {root}, which has no {library.LIBRARY}"
+    )
     assert str(missing(CoppeliaSim.info)).startswith(told)
     monkeypatch.delenv(library.ROOT)
     assert missing(CoppeliaSim.info) == (
