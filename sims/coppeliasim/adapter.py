@@ -85,7 +85,7 @@ class CoppeliaSim(Simulator):
         self._start()
         build.set_engine(s, scene.gravity)
         self._surface = surface = Surface(s)
-        shapes = build.Shapes()
+        shapes = build.Shapes(s.engine)
         self._ground = build.add_ground(
             shapes, surface, scene.ground_friction, scene.ground_restitution
         )

@@ -67,11 +67,13 @@ class Drives:
         motors = np.array([joint.motor for joint in robot.joints], dtype=bool)
         self._forced = motors | (settings.drive == "force")
         self.led: dict[int, int] = {}
+        self._coupled: list[list[int]] = []
         index = robot.joint_names.index
         for pair in robot.gripper.couplings:
             if self.own:
                 follower, leader = joints[pair.follower], joints[pair.leader]
                 call("simSetJointDependency_D", follower, leader, c_double(0.0), c_double(1.0))
+                self._coupled.append([index(pair.follower), index(pair.leader)])
             else:
                 self.led[index(pair.follower)] = index(pair.leader)
         for k, (handle, joint) in enumerate(zip(self.handles, robot.joints, strict=True)):
@@ -102,7 +104,11 @@ class Drives:
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         """Set points of all joints."""
+        position, velocity, effort = position.copy(), velocity.copy(), effort.copy()
         self.commanded = position, velocity, effort
+        for pair in self._coupled:  # both drives pull at one joint; MuJoCo's coupling is soft
+            for told in self.commanded:
+                told[pair] = told[pair].mean()
 
     def act(self) -> None:
         """Before a step: tell the joints what they are asked for."""

@@ -73,8 +73,8 @@ CARRIER = 0.01
 TRIES = 100
 """Shapes that may be made until one lies behind all others in memory."""
 
-FILLERS = 20_000
-"""Small shapes that may be made to fill the gaps in memory before them."""
+FILLERS = 1000
+"""Small shapes that may be made at a time to fill the gaps in memory before them."""
 
 
 @dataclass(frozen=True)
@@ -122,10 +122,11 @@ class Shapes:
     """Makes shapes whose addresses in memory ascend.
 
     Bullet 2.78, ODE and Newton are given bodies in the order of these addresses, and their results
-    depend on the order: with shapes as they come, two processes would differ.
+    depend on the order: with shapes as they come, two processes would differ. MuJoCo's do not.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, engine: str) -> None:
+        self._ordered = engine != "mujoco"
         self._last, self._rejected = 0, list[int]()
 
     def made(self, make: Callable[[], int]) -> int:
@@ -136,7 +137,7 @@ class Shapes:
         """
         for _ in range(TRIES):
             handle = make()
-            if address(handle) > self._last:
+            if not self._ordered or address(handle) > self._last:
                 self._last = address(handle)
                 return handle
             self._rejected.append(handle)
