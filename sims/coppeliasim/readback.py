@@ -126,17 +126,15 @@ class ReadBack(readback.ReadBack):
         """Of a pair with others like it."""
         handle = part.handle
         if self.engine == "mujoco":
-            return {"friction": get_floats(handle, "mujoco.friction")[0], "restitution": 0.0}
+            return {"friction": get_floats(handle, "mujoco.friction")[0]}
         if self.engine == "newton":
             friction = get_float(handle, "newton.kineticFriction")
             return {"friction": friction**2, "restitution": get_float(handle, "newton.restitution")}
         friction = get_float(handle, self.surfaces.friction_name) ** 2
         if self.engine == "ode":
-            return {"friction": friction, "restitution": 0.0}
-        return {
-            "friction": friction,
-            "restitution": get_float(handle, "bullet.restitution") ** 2,
-        }
+            return {"friction": friction}
+        bounce = get_float(handle, "bullet.restitution") ** 2
+        return {"friction": friction, "restitution": bounce}
 
     def inertial(self, part: Part) -> dict[str, Any]:
         mass, centre, inertia = part.weight()
@@ -146,9 +144,13 @@ class ReadBack(readback.ReadBack):
             "mass": mass,
             "com": placed(centre[None], frame)[0],
             "inertia": turn @ inertia @ turn.T,
-            "damping": self.surfaces.damping(part.handle),
+            **self._damping(part),
             "gravity": 1.0 - self._borne(part),
         }
+
+    def _damping(self, part: Part) -> dict[str, Any]:
+        mujoco = self.engine == "mujoco"
+        return {} if mujoco else {"damping": self.surfaces.damping(part.handle)}
 
     def _borne(self, part: Part) -> float:
         """Share of gravity that does not act on a link."""

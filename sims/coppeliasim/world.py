@@ -211,8 +211,6 @@ class Surface:
 
     def damping(self, handle: int) -> FloatArray:
         """As of `damp`."""
-        if self.engine == "mujoco":
-            return np.zeros(2)
         family, suffix, period = self._damping
         lost = [get_float(handle, f"{family}.{kind}{suffix}") for kind in ("linear", "angular")]
         return np.asarray(-np.log1p(-np.asarray(lost)) / period)
