@@ -236,8 +236,8 @@ def told_coppeliasim(s: Any) -> Told:
     }
     if told["engine"] == "mujoco":
         handle = s._bodies["late"].handle
-        told["solref"] = library.get_floats(handle, "mujoco.solref")
-        told["solimp"] = library.get_floats(handle, "mujoco.solimp")[:3]
+        told["solref"] = library.get_floats(handle, "mujoco.solref").tolist()
+        told["solimp"] = library.get_floats(handle, "mujoco.solimp")[:3].tolist()
     return told
 
 
