@@ -66,16 +66,6 @@ class CoppeliaSim(Simulator):
                 "with MuJoCo the program tells where bodies were before the last step; joints are "
                 "told as they are after it",
             ),
-            Deviation(
-                "joint/*/stiffness joint/*/damping joint/*/friction joint/*/rest",
-                "of the program's engines MuJoCo alone has springs, damping and friction in joints",
-                only="spring",
-            ),
-            Deviation(
-                "link/*/gravity",
-                "of the program's engines MuJoCo alone has links feel a share of gravity",
-                only="link_gravity",
-            ),
         ),
         environment={"QT_QPA_PLATFORM": "offscreen"},
     )

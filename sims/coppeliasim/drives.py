@@ -55,6 +55,14 @@ class Drives:
                 f"coppeliasim.drive=force needs engine=mujoco, not {settings.engine}: the other "
                 "engines damp no joints; choose drive=velocity or drive=position"
             )
+        if not self.own and any(
+            joint.passive_damping or joint.friction or joint.spring or joint.gravity != 1
+            for joint in robot.joints
+        ):
+            raise NotSupportedError(
+                f"coppeliasim with engine={settings.engine} gives joints no damping, friction or "
+                "springs, and links their whole weight; choose coppeliasim.engine=mujoco"
+            )
         self._names = robot.joint_names
         self.handles = [joints[name] for name in robot.joint_names]
         by_name = {joint.name: joint for joint in prepared.joints}

@@ -19,6 +19,7 @@ from pytest_simbench.client.environments import missing
 from pytest_simbench.client.errors import EngineFailed, WorkerExited
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.simulator import UnavailableError
+from pytest_simbench.tasks import Jitter, Stacking
 
 from .worlds import Worlds
 
@@ -89,8 +90,6 @@ def test_its_files_are_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_springs_are_mujocos_alone() -> None:
-    from pytest_simbench.tasks import Jitter, Stacking
-
     with (
         Worlds(CoppeliaSim) as worlds,
         pytest.raises(EngineFailed, match="drive=force needs engine=mujoco, not ode"),
