@@ -86,7 +86,7 @@ class Drives:
                 self.led[index(pair.follower)] = index(pair.leader)
         for k, (handle, joint) in enumerate(zip(self.handles, robot.joints, strict=True)):
             set_int(handle, "dynCtrlMode", MODES["force" if self._forced[k] else settings.drive])
-            most = joint.effort_limit
+            most = joint.effort_limit * (2 if k in self.led else 1)  # it bears the leader's too
             call(
                 "simSetJointTargetForce_D", handle, c_double(0.0 if self._forced[k] else most), True
             )
