@@ -46,9 +46,11 @@ ADAPTERS = {name: entry.value for name, entry in registered().items()}
 HERE = [
     name
     for name in ADAPTERS
-    if not missing(adapter(name).info) and interpreter(adapter(name).info) is None
+    if not missing(adapter(name).info)
+    and interpreter(adapter(name).info) is None
+    and adapter(name).info.modules
 ]
-"""The engines that can be imported in this process."""
+"""The engines that can be imported in this process; a program of the user's own is not."""
 
 
 def able_to(capability: Capability) -> list[str]:

@@ -327,7 +327,7 @@ def missing(info: SimulatorInfo) -> str | None:
     if absent:
         module = no_module(absent[:1])
         return f"{info.name} is not installed (no module {module}); install it: {info.install}"
-    return None
+    return info.no_program or None
 
 
 def outside(info: SimulatorInfo) -> Environment | SystemPython | None:

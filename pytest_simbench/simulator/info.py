@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from fnmatch import fnmatchcase
 from importlib.util import find_spec
+from pathlib import Path
 
 from pytest_simbench.ground.errors import NotSupportedError, SimulatorError
 from pytest_simbench.ground.versions import BUILD, VersionedName, release_numbers
@@ -123,6 +125,8 @@ class SimulatorInfo:
         distribution: PyPI distribution whose version is the engine's.
         modules: modules that must be importable for the simulator to be here; of several joined by
             `|`, one of them (`engine8|engine9`: modules that carry their version).
+        program: for an engine that is a program of the user's own, which no package brings: the
+            environment variable that names its folder, and a file in it. Its modules may be none.
         install: what to type when it is missing.
         licence: of the engine.
         engine: physics engine inside.
@@ -175,6 +179,17 @@ class SimulatorInfo:
     oldest_version: str = ""
     friction_rule: str = ""
     reads: tuple[str, ...] = ()
+    program: tuple[str, str] = ("", "")
+
+    @property
+    def no_program(self) -> str:
+        """Why the program is not here, as a sentence; empty where it is, or where it is none."""
+        variable, file = self.program
+        named = os.environ.get(variable, "") if variable else ""
+        if not variable or (named and Path(named, file).is_file()):
+            return ""
+        told = f"{variable} is {named}, which has no {file}" if named else f"{variable} is not set"
+        return f"{self.name} is not here ({told}): {self.install}"
 
     def of_version(self, name: VersionedName) -> SimulatorInfo:
         """Of a release or a build of the engine.

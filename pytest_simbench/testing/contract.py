@@ -58,6 +58,8 @@ def imports_without_engine(subject: Subject) -> None:
     package it is just the modules that stand there by name."""
     module, _, name = subject.adapter.partition(":")
     own = module.partition(".")[0]
+    if all(subject.cls.info.program):
+        return  # no module is the engine
     roots = {part: part.partition(".")[0] for part in subject.cls.info.modules}
     engine = {part if root == own else root for part, root in roots.items()}
     engine = {part for part in engine if not f"{module}.".startswith(f"{part}.")}
@@ -84,7 +86,8 @@ def info_complete(subject: Subject) -> None:
     )
     for text in ("title", "distribution", "install", "licence", "engine", "tested_version"):
         require(getattr(info, text).strip(), f"info.{text} is empty")
-    require(info.modules, "info.modules is empty: nothing tells whether the engine is here")
+    told = info.modules or all(info.program)
+    require(told, "info.modules is empty: nothing tells whether the engine is here")
     unknown = [c for c in info.capabilities if not isinstance(c, Capability)]
     require(not unknown, f"info.capabilities has unknown entries {unknown}")
     silent = [d.quantity for d in info.deviations if not d.reason.strip()]

@@ -221,6 +221,26 @@ def read(token: str) -> Any:
     return words[token] if token in words else token[1:-1] if token[0] == '"' else float(token)
 
 
+def told_coppeliasim(s: Any) -> Told:
+    """The gain is its drives'."""
+    from pytest_simbench.sims.coppeliasim import drives, library, world
+
+    kind = library.get_integers(library.SCENE, "dynamicsEngine")
+    modes = {library.get_int(handle, "dynCtrlMode") for handle in s._drives.handles}
+    told = {
+        "timestep": library.get_float(library.SCENE, "dynamicsStepSize"),
+        "engine": next(name for name, (pair, _) in library.ENGINES.items() if pair == kind),
+        "drive": one(name for name, mode in drives.MODES.items() if mode in modes),
+        "position_gain": s._drives.settings.position_gain,
+        "cone": world.CONES[library.get_int(library.SCENE, "mujoco.cone")],
+    }
+    if told["engine"] == "mujoco":
+        handle = s._bodies["late"].handle
+        told["solref"] = library.get_floats(handle, "mujoco.solref").tolist()
+        told["solimp"] = library.get_floats(handle, "mujoco.solimp")[:3].tolist()
+    return told
+
+
 def told_ovphysx(s: Any) -> Told:
     """What the stage says, in its words. PhysX tells little; that it heeds it, the motion shows."""
     import ovphysx

@@ -112,6 +112,12 @@ TOLD: dict[str, tuple[Changes, ...]] = {
         {"engine": "bullet-featherstone"},
         {"engine": "bullet-featherstone", "torsional_friction": 0.3},
     ),
+    "coppeliasim": (
+        {"timestep": 0.002, "drive": "velocity", "position_gain": 0.3, "cone": "elliptic"},
+        {"engine": "ode"},
+        {"engine": "mujoco", "solref": (0.01, 1.2), "solimp": (0.8, 0.9, 0.002)},
+        {"engine": "mujoco"},
+    ),
     "ovphysx": (
         {
             "solver": "PGS", "body_iterations": 7, "arm_iterations": 9, "velocity_iterations": 2,

@@ -1,0 +1,1 @@
+"""CoppeliaSim, with the physics engines that it brings."""
