@@ -17,7 +17,7 @@ SIMULATORS = {
     "drake": "Drake", "dart": "DART", "newton": "Newton", "genesis": "Genesis",
 }  # fmt: skip
 """Those of stacking.csv and throwing.csv."""
-NAMES = {**SIMULATORS, "ode": "ODE", "gazebo": "Gazebo"}
+NAMES = {**SIMULATORS, "ode": "ODE", "gazebo": "Gazebo", "coppeliasim": "CoppeliaSim"}
 
 Line = dict[str, str]
 

@@ -33,14 +33,15 @@ LIBRARY = "libcoppeliaSimHeadless.so"
 NEEDED = "simGetPropertyInfo"
 """A function that came with the properties of objects, by which this adapter sets everything."""
 
-ENGINES: dict[str, tuple[tuple[int, int], str]] = {
-    "bullet": ((0, 0), "simBullet-2-78"),
-    "bullet283": ((0, 283), "simBullet-2-83"),
-    "ode": ((1, 0), "simODE"),
-    "newton": ((3, 0), "simNewton"),
-    "mujoco": ((4, 0), "simMujoco"),
+ENGINES: dict[str, tuple[tuple[int, int], tuple[str, ...]]] = {
+    "bullet": ((0, 0), ("simBullet-2-78",)),
+    "bullet283": ((0, 283), ("simBullet-2-83",)),
+    "ode": ((1, 0), ("simODE",)),
+    "newton": ((3, 0), ("simNewton",)),
+    "mujoco": ((4, 0), ("simMujoco", "simAssimp")),
 }
-"""By engine: what the program calls it (type and version), and its plug-in."""
+"""By engine: what the program calls it (type and version), and its plug-ins. Without the one that
+writes meshes a world of MuJoCo's stands still, and nothing says so."""
 
 SCENE, APP, ALL, NONE = -12, -13, -2, -1
 """Handles: of the scene, of the program, of every object, of none (simConst.h)."""
@@ -69,13 +70,15 @@ def root() -> Path:
 
 def check_engine(engine: str) -> None:
     """Raise `UnavailableError` where the program was installed without an engine."""
-    there = [
-        name for name, (_, plugin) in ENGINES.items() if (root() / f"lib{plugin}.so").is_file()
-    ]
-    if engine not in there:
+    lacks = {
+        name: [file for p in plugins if not (root() / (file := f"lib{p}.so")).is_file()]
+        for name, (_, plugins) in ENGINES.items()
+    }
+    if lacks[engine]:
+        there = ", ".join(name for name, files in lacks.items() if not files)
         raise UnavailableError(
-            f"the CoppeliaSim in {root()} has no lib{ENGINES[engine][1]}.so, and so not "
-            f"engine={engine}; choose from {', '.join(there) or 'none: it has no engine at all'}"
+            f"the CoppeliaSim in {root()} has no {lacks[engine][0]}, and so not engine={engine}; "
+            f"choose from {there or 'none: it has no engine at all'}"
         )
 
 

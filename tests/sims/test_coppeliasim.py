@@ -57,6 +57,9 @@ def test_no_such_engine(root: Path) -> None:
     library.check_engine("ode")
     with pytest.raises(UnavailableError, match=r"no libsimNewton.so, .*newton; choose from ode$"):
         library.check_engine("newton")
+    (root / "libsimMujoco.so").touch()
+    with pytest.raises(UnavailableError, match=r"no libsimAssimp.so, .*mujoco; choose from ode$"):
+        library.check_engine("mujoco")
 
 
 def test_a_library_that_is_none(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
