@@ -74,7 +74,9 @@ def contact(task: str, profile: str) -> str:
 
 def _cell(each: list[list[Line]], metric: Metric) -> str:
     if metric.kind == "yes_no":
-        all_of = [line for lines in each for line in lines]
-        return f"{sum(numbers(all_of, metric.name)):g} of {len(all_of)}"
+        asked = [
+            line for lines in each for line in lines if line["status"] != "ok" or line[metric.name]
+        ]
+        return f"{sum(numbers(asked, metric.name)):g} of {len(asked)}"
     means = [fmean(found) if (found := numbers(lines, metric.name)) else None for lines in each]
     return " / ".join("-" if mean is None else significant(round(mean, 3), 2) for mean in means)
