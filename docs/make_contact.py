@@ -68,8 +68,7 @@ def contact(task: str, profile: str) -> str:
             cells = [_cell(each, metric) for metric in metrics]
             rows.append([name, f"{crashed} of {len(of)}", *cells, significant(cost)])
     heads = [f"{metric.title} {metric.unit}".strip() for metric in metrics]
-    told = f"In a cell: {' / '.join(cases)}.\n\n" if len(cases) > 1 else ""
-    return told + table(("simulator", "crashed", *heads, "CPU s per s"), rows)
+    return table(("simulator", "crashed", *heads, "CPU s per s"), rows)
 
 
 def _cell(each: list[list[Line]], metric: Metric) -> str:

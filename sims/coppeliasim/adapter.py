@@ -49,6 +49,7 @@ class CoppeliaSim(Simulator):
         engine="Bullet, ODE, Newton Dynamics, MuJoCo",
         language="C++",
         tested_version="4.10.0",
+        oldest_version="4.10.0",
         capabilities=Capability.named("contact_count contact_forces deterministic"),
         deviations=(
             Deviation("body/*/margin link/*/margin", "the program tells no margin of shapes"),

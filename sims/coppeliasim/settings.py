@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pytest_simbench.simulator import Seen, Settings, chosen_on
+from pytest_simbench.simulator import Seen, Settings
 from pytest_simbench.simulator.settings import EACH, Each, Linear, Log
 
 Engine = Literal["bullet", "bullet283", "ode", "newton", "mujoco"]
@@ -63,4 +63,7 @@ PROFILES: Mapping[str, Settings] = {
     ),
 }
 
-CHOSEN_ON = chosen_on(Seen.seeds("throwing", 10001, 10001), Seen.seeds("stacking", 10001, 10001))
+CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {
+    "tuned": (Seen.seeds("throwing", 300001, 300001), Seen.seeds("stacking", 300001, 300001)),
+}
+"""Settings are chosen on some seeds and published on others; where not, the report says so."""

@@ -141,7 +141,7 @@ def test_the_command_merges_and_reports(
 BAD: dict[str, tuple[dict[str, Any], str]] = {
     "class": ({"task": Falling}, "a class instead of a task: write run(Falling())"),
     "task": ({"task": 3}, "run(3) takes a task, for instance run(Throwing())"),
-    "misspelt": ({"simulators": "mojuco"}, "unknown simulator 'mojuco'; choose from dart, "),
+    "misspelt": ({"simulators": "mojuco"}, "unknown simulator 'mojuco'; choose from "),
     "none": ({"simulators": []}, "give a name"),
     "build": ({"simulators": "mujoco@/no/python"}, "there is no such file"),
     "reps": ({"reps": 0}, "reps=0: give a whole number from 1 to 100000"),

@@ -21,6 +21,7 @@ DOCS = ROOT / "docs"
 sys.path.append(str(DOCS))  # for the scripts, which are no package
 
 import made  # noqa: E402
+import make_contact  # noqa: E402
 import make_results  # noqa: E402
 import make_tasks  # noqa: E402
 import make_truth  # noqa: E402
@@ -146,8 +147,8 @@ def test_no_profile_was_chosen_on_a_published_seed() -> None:
 def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of published numbers that holds nothing yet."""
     monkeypatch.setattr(tables, "DATA", tmp_path)
-    kept = (*published_runs.PUBLISHED.values(), make_tasks.ARMS, make_tasks.PUSHING)
-    for one in (*kept, *make_tasks.EXPERIMENTS.values(), make_truth.TRUTH, make_truth.SWEEP):
+    kept = (*published_runs.PUBLISHED.values(), *make_tasks.KEPT, make_contact.CONTACT)
+    for one in (*kept, make_truth.TRUTH, make_truth.SWEEP):
         (tmp_path / f"{one.name}.csv").write_text(f"{','.join(one.columns)}\n")
     return tmp_path
 
