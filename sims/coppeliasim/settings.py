@@ -26,6 +26,9 @@ class CoppeliaSimSettings(Settings):
         drive: the program's position control (`position`), its velocity control told in each step
             how to follow (`velocity`), or the scene's drive law as a force (`force`).
         position_gain: of `velocity`: share of the position error that is corrected in a step.
+        iterations: of Bullet's solver.
+        sticky: with Bullet 2.78 contacts resist sliding in two directions; else in one alone, that
+            in which they slide.
         cone: of MuJoCo's friction; as in its own options.
         solref: time constant [s] and damping ratio of MuJoCo's contacts.
         solimp: their impedance: minimum, maximum, width [m].
@@ -35,6 +38,9 @@ class CoppeliaSimSettings(Settings):
     engine: Annotated[Engine, EACH] = "bullet"
     drive: Annotated[Drive, EACH] = "position"
     position_gain: Annotated[float, Linear(0.05, 1, when=("drive", "velocity"))] = 0.1
+
+    iterations: Annotated[int, Log(10, 1000, when=("engine", "bullet"))] = 100
+    sticky: Annotated[bool, Each(("engine", "bullet"))] = False
 
     cone: Annotated[Literal["pyramidal", "elliptic"], MUJOCO] = "pyramidal"
     solref: tuple[Annotated[float, Log(0.001, 0.05)], Annotated[float, Log(0.5, 4)]] = (0.02, 1.0)

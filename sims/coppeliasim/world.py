@@ -188,6 +188,7 @@ class Surface:
         set_float(handle, self.friction_name, root)
         if self.engine != "ode":
             set_float(handle, "bullet.restitution", float(np.sqrt(restitution)))
+            set_bool(handle, "bullet.stickyContact", self.settings.sticky)
 
     def damp(self, handle: int, damping: FloatArray) -> None:
         """Linear and angular damping c of dv/dt = -c v [1/s]; MuJoCo knows none of bodies."""
@@ -229,6 +230,7 @@ def set_engine(s: CoppeliaSimSettings, gravity: Sequence[float]) -> None:
     set_float(SCENE, "timeStep", s.timestep)
     set_float(SCENE, "dynamicsStepSize", s.timestep)
     set_vector(SCENE, "gravity", gravity)
+    set_int(SCENE, "bullet.iterations", s.iterations)
     set_int(SCENE, "mujoco.cone", CONES.index(s.cone))
     set_floats(SCENE, "mujoco.kinematicWeldSolref", s.solref)
     set_floats(SCENE, "mujoco.kinematicWeldSolimp", [*s.solimp, *SIGMOID])

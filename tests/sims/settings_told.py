@@ -232,10 +232,13 @@ def told_coppeliasim(s: Any) -> Told:
         "engine": next(name for name, (pair, _) in library.ENGINES.items() if pair == kind),
         "drive": one(name for name, mode in drives.MODES.items() if mode in modes),
         "position_gain": s._drives.settings.position_gain,
+        "iterations": library.get_int(library.SCENE, "bullet.iterations"),
         "cone": world.CONES[library.get_int(library.SCENE, "mujoco.cone")],
     }
+    handle = s._bodies["late"].handle
+    if told["engine"] == "bullet":
+        told["sticky"] = library.get_bool(handle, "bullet.stickyContact")
     if told["engine"] == "mujoco":
-        handle = s._bodies["late"].handle
         told["solref"] = library.get_floats(handle, "mujoco.solref").tolist()
         told["solimp"] = library.get_floats(handle, "mujoco.solimp")[:3].tolist()
     return told

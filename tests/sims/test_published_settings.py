@@ -14,7 +14,7 @@ import pytest
 from pytest_simbench.simulator.registry import adapter, registered
 
 PUBLISHED = {
-    "coppeliasim": {"default": "56b12d0c", "tuned": "a2be6424"},
+    "coppeliasim": {"default": "2d3b75f8", "tuned": "552fe23e"},
     "dart": {"default": "898a4638", "tuned": "43e82ad0", "real": "43e82ad0"},
     "drake": {"default": "09441a8f", "tuned": "cf3c33e5", "real": "d8e9fec8"},
     "gazebo": {"default": "3def4e2e", "tuned": "93d12aae"},

@@ -113,7 +113,10 @@ TOLD: dict[str, tuple[Changes, ...]] = {
         {"engine": "bullet-featherstone", "torsional_friction": 0.3},
     ),
     "coppeliasim": (
-        {"timestep": 0.002, "drive": "velocity", "position_gain": 0.3, "cone": "elliptic"},
+        {
+            "timestep": 0.002, "drive": "velocity", "position_gain": 0.3, "cone": "elliptic",
+            "iterations": 70, "sticky": True,
+        },
         {"engine": "ode"},
         {"engine": "mujoco", "solref": (0.01, 1.2), "solimp": (0.8, 0.9, 0.002)},
         {"engine": "mujoco"},
