@@ -16,9 +16,17 @@ from pytest_simbench.motion.registry import find
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.testing import CHECKS, ConformanceTest, Subject, conformance_checks
 from pytest_simbench.testing.kit import Kit, read_expected_failures
+from pytest_simbench.testing.subject import close_workers
 
 FILE = Path(__file__).with_name("expected_failures.txt")
 EXPECTED = read_expected_failures(FILE)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def workers_end() -> Iterator[None]:
+    """A worker of PhysX takes a fifth of a core while it waits."""
+    yield
+    close_workers()
 
 
 @pytest.fixture
