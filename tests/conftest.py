@@ -9,9 +9,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-# pytester takes out again what a test imports first; of matplotlib a part would then come twice.
+# pytester takes out again what a test imports first: of matplotlib a part would then come twice,
+# and Pinocchio not a second time.
 import matplotlib.backends.backend_agg
 import matplotlib.figure  # noqa: F401
+import pinocchio  # noqa: F401
 import psutil
 import pytest
 from hypothesis import settings

@@ -239,8 +239,6 @@ def test_gui_without_any_display_is_a_skip(
 TOLD = {
     "pybullet": [
         "body/*/gravity link/*/gravity: Bullet has one gravity for all (not told by the engine)",
-        "body/*/margin link/*/margin: Bullet's collision margin; a box has it within its faces, a "
-        "mesh outside (differs by at most 0.001)",
     ],
     "drake": [
         "*/restitution: Drake has no restitution; its contacts dissipate (not told by the engine)",
