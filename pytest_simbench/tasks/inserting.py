@@ -23,9 +23,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.world import World
-from pytest_simbench.ground.errors import NotSupportedError
 from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.grips import grips, hand_of
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over
@@ -37,7 +35,7 @@ from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.tasks.arm import LostBody
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task
 from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
-from pytest_simbench.tasks.resting import RESTLESS, rest
+from pytest_simbench.tasks.resting import RESTLESS, rest, told_forces
 
 Section = Literal["square", "round"]
 
@@ -236,18 +234,14 @@ class Inserting(Task):
     def lower(self, hand: Manipulator, forces: list[float]) -> None:
         """Straight down, step by step, and the force of the hole on the peg after each [N]; none
         where the simulator does not tell forces of this scene."""
-        names, told = [body.name for body in self.hole()], True
+        names = [body.name for body in self.hole()]
         for _ in range(round((ABOVE + CHAMFER + self.depth) / STEP)):
             hand.move_straight(hand.tool.translated(z=-STEP), speed=SLOW, ignored=tuple(names))
-            try:
-                found = hand.world.contact_forces() if told else {}
-            except EngineFailed as error:
-                if error.remote != NotSupportedError.__name__:
-                    raise
-                found, told = {}, False
+            found = told_forces(hand.world)
+            if found is None:
+                continue
             each = [found[pair][:3] for n in names if (pair := ("body/peg", f"body/{n}")) in found]
-            if told:
-                forces.append(float(np.linalg.norm(np.sum(each, axis=0))))
+            forces.append(float(np.linalg.norm(np.sum(each, axis=0))))
 
 
 @dataclass(frozen=True)

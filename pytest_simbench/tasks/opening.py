@@ -16,7 +16,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.world import World
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.robot_files import keep
@@ -28,7 +27,6 @@ from pytest_simbench.description.urdf import (
     write_joint,
     write_link,
 )
-from pytest_simbench.ground.errors import NotSupportedError
 from pytest_simbench.motion.beside import with_thing
 from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.grips import grips
@@ -40,6 +38,7 @@ from pytest_simbench.scene import Box, FloatArray, Gripper, Joint, Pose, Robot, 
 from pytest_simbench.scene.robot import FASTEST, FREE
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task
 from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
+from pytest_simbench.tasks.resting import told_forces
 
 PLACE = (0.55, 0.0, 0.25)
 """Of the handle's middle, the drawer shut [m]. It opens towards the robot, along minus x."""
@@ -277,11 +276,8 @@ def _tool(world: World, hand: Manipulator) -> FloatArray:
 def _pull(world: World, outward: FloatArray) -> float:
     """What the robot's other links do to the drawer along its way [N]; no number in an engine that
     does not tell."""
-    try:
-        forces = world.contact_forces()
-    except EngineFailed as error:
-        if error.remote != NotSupportedError.__name__:
-            raise
+    forces = told_forces(world)
+    if forces is None:
         return float("nan")
     of_links = (forces[pair][:3] for pair in forces if pair[0] == f"link/{DRAWER}")
     return float(sum(outward @ force for force in of_links))

@@ -47,20 +47,26 @@ def calm(world: World) -> tuple[Motion, list[Forces]]:
     simulator does not tell them of this scene."""
     parts: list[Motion] = []
     forces: list[Forces] = []
-    began, told = world.time, True
+    began = world.time
     with world.phase("rest"):
         for k in range(1, LOOKS + 1):
             until = began + k * RESTLESS / LOOKS
             part = world.wait(until - world.time, log_period=LOG_PERIOD)
             assert part is not None  # a log was asked for
             parts.append(part)
-            try:
-                forces += [world.contact_forces()] if told else []
-            except EngineFailed as error:
-                told = False
-                if error.remote != NotSupportedError.__name__:
-                    raise
+            if k == 1 or forces:
+                forces += [found] if (found := told_forces(world)) is not None else []
     return Motion.joined(parts), forces
+
+
+def told_forces(world: World) -> Forces | None:
+    """The forces of contacts; None where the simulator does not tell them of this scene."""
+    try:
+        return world.contact_forces()
+    except EngineFailed as error:
+        if error.remote != NotSupportedError.__name__:
+            raise
+        return None
 
 
 def spread(scene: Scene, forces: Sequence[Forces]) -> float | None:
