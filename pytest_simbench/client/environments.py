@@ -61,11 +61,7 @@ def default_folder() -> Path:
 
 @dataclass(frozen=True)
 class Environment:
-    """The environment of one simulator, whether it exists or not.
-
-    Attributes:
-        folder: of this environment.
-    """
+    """The environment of one simulator, whether it exists or not."""
 
     info: SimulatorInfo
     folder: Path

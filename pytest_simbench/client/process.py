@@ -249,7 +249,6 @@ class WorkerProcess:
         Args:
             take: gets each frame, in another thread, while a motion is asked for; must not raise.
                 The time that drawing takes puts the deadline off. None: no more pictures.
-            period: [s].
             size: width and height [pixels].
         """
 

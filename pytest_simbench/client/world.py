@@ -43,7 +43,6 @@ class World:
     be, see `scene.plausibility`.
 
     Attributes:
-        scene: what was loaded.
         time: simulated [s].
         joints: position and velocity of the driven joints, (2, n_joints).
         bodies: rows of the free bodies, (n_free, 13): position [m], quaternion w, x, y, z, linear

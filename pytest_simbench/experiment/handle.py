@@ -34,7 +34,6 @@ class SimulatorHandle:
     example is written to a file, and a note on the exception says how to replay it.
 
     Attributes:
-        case: simulator, settings and limits.
         constructed: the simulator that the worker made last.
     """
 
@@ -49,7 +48,6 @@ class SimulatorHandle:
         """A freshly loaded world, for as long as the `with` block lasts.
 
         Args:
-            scene: to be loaded.
             parity: whether to check that the engine built this scene.
             options: of `TapedWorld`: a tape to be played, a period of samples.
 

@@ -45,7 +45,6 @@ class Trace:
 
     Attributes:
         time, joints, bodies: see the module.
-        joint_names, body_names: of the joints and of the free bodies.
         boxes: all bodies of the scene, the free ones in the order of `body_names`, as they began.
         figure: the robot; None for a scene without one.
         phases: when each began [s], and its name, in the order of time.

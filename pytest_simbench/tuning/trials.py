@@ -123,7 +123,6 @@ class Trials:
     """Looks at candidates. What the run folder holds already is not repeated.
 
     Attributes:
-        target: what for.
         case: how repetitions are run, with the settings that the search began with.
         runs: its repetitions. As many looks at a task as there are jobs are had at once, and told
             one after the other: what is had beyond the one that ends a candidate does not count.

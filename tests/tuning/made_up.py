@@ -16,9 +16,8 @@ from pytest_simbench.experiment.repetition import Ended, Hooks
 from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Failure
-from pytest_simbench.tuning.trials import Runs
 from pytest_simbench.tuning.target import Look, Target
-from pytest_simbench.tuning.trials import Trials
+from pytest_simbench.tuning.trials import Runs, Trials
 from tests.tiny import Falling
 
 Score = Callable[[Mapping[str, Any], int], float | None]
