@@ -51,7 +51,7 @@ def with_thing(scene: Scene, thing: Robot) -> Scene:
     urdf = mounted(
         ET.fromstring(kept["urdf"]), ET.fromstring(other["urdf"]), roots[1], roots[0], place, STAND
     )
-    path = keep(ET.tostring(urdf, encoding="unicode"), {**kept["meshes"], **other["meshes"]})
+    path = keep(urdf, {**kept["meshes"], **other["meshes"]})
     both = replace(
         arm,
         name=f"{arm.name}_and_{thing.name}",

@@ -274,7 +274,7 @@ def _with_files(robot: Robot, hand: _Hand, srdf: str | None) -> Robot:
         kept = content_of(robot)
         urdf = ET.fromstring(kept["urdf"])
         add_tool(urdf, robot.tool_frame, hand.tool)
-        path = keep(ET.tostring(urdf, encoding="unicode"), kept["meshes"])
+        path = keep(urdf, kept["meshes"])
         robot = replace(robot, urdf=str(path), packages={}, tool_frame=TOOL_LINK)
     elif hand.mount is None:
         urdf = description_xml(robot)
@@ -285,7 +285,7 @@ def _with_files(robot: Robot, hand: _Hand, srdf: str | None) -> Robot:
             ET.fromstring(arm["urdf"]), ET.fromstring(other["urdf"]), panda.HAND, *hand.mount
         )
         lists.append(read_xml(whole.srdf, "the list of link pairs"))
-        path = keep(ET.tostring(urdf, encoding="unicode"), {**arm["meshes"], **other["meshes"]})
+        path = keep(urdf, {**arm["meshes"], **other["meshes"]})
         robot = replace(robot, urdf=str(path), packages={})
     pairs = ET.tostring(pairs_not_checked(urdf, lists), encoding="unicode")
     return replace(robot, srdf=str(keep(pairs, {}, ".srdf")))

@@ -84,7 +84,7 @@ def _adapted(robot: Robot, width: float, gap: float) -> tuple[str, float | None]
     kept = content_of(robot)
     urdf = ET.fromstring(kept["urdf"])
     add_tool(urdf, robot.tool_frame, Pose.at(0.0, width / 2, 0.0), GRASP_LINK, GRASP_JOINT)
-    path = keep(ET.tostring(urdf, encoding="unicode"), kept["meshes"])
+    path = keep(urdf, kept["meshes"])
     return str(path), _opening(robot, gap, width / 2)
 
 

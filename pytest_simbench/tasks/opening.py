@@ -97,7 +97,7 @@ def drawer(friction: float, mass: float, at: Pose) -> Robot:
     write_joint(root, joint, RANGE, 2 * friction, FASTEST)
     motor = Joint(SLIDE, FREE, 0.0, 2 * friction, 0.0, 0.0, friction=friction)
     return Robot(
-        DRAWER, str(keep(ET.tostring(root, encoding="unicode"), {})), {}, "", (motor,),
+        DRAWER, str(keep(root)), {}, "", (motor,),
         Gripper((), 0.0, 0.0, 0.0), DRAWER, at,
     )  # fmt: skip
 
