@@ -242,7 +242,7 @@ def _unread(root: ET.Element) -> Iterator[tuple[str, ET.Element]]:
 def _lowest(robot: Robot) -> float:
     """Height of the lowest point of any link at the start [m]."""
     prepared = PreparedRobot(robot)
-    poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
+    poses = link_poses(prepared)
     return min(
         (
             float((own_points(shape) @ pose.rotation().T)[:, 2].min() + pose.position[2])

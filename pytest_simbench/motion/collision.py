@@ -121,8 +121,7 @@ class PlanningScene:
         what is beside the arm."""
         inverse = self.model.base.inverse()
         if self._prepared and joints is not None:
-            names = self.model.robot.joint_names
-            placed = link_poses(self._prepared, dict(zip(names, joints.tolist(), strict=True)))
+            placed = link_poses(self._prepared, joints)
             for link, shapes in self._things.items():
                 for index, within in shapes.items():
                     at = inverse * pin.SE3(placed[link].matrix()) * within

@@ -264,8 +264,7 @@ def _place(world: World) -> Pose:
     """Of the handle's middle: the drawer's frame."""
     robot = world.scene.robot
     assert robot is not None  # see `scene`
-    joints = dict(zip(robot.joint_names, world.joints[0].tolist(), strict=True))
-    return link_poses(PreparedRobot(robot), joints)[DRAWER]
+    return link_poses(PreparedRobot(robot), world.joints[0])[DRAWER]
 
 
 def _tool(world: World, hand: Manipulator) -> FloatArray:
