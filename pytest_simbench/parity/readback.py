@@ -35,7 +35,10 @@ class ReadBack(ABC):
 
     Attributes:
         scene, prepared: the adapter's; the reduced robot is None in a scene without one.
+        grounded: whether the world has a ground, as each but that of a user's file has.
     """
+
+    grounded = True
 
     def __init__(
         self, simulator: Any, ground: Any, bodies: Mapping[str, Any], links: Mapping[str, Any]
@@ -67,7 +70,8 @@ class ReadBack(ABC):
                     reported[f"coupling/{pair.follower}"] = told
             coupled = self.coupled(robot.gripper.couplings)
             reported |= {} if coupled is None else {"gripper/coupled": float(coupled)}
-        return reported | self.touches()
+        reported |= self.touches()
+        return {k: v for k, v in reported.items() if self.grounded or "ground/" not in k}
 
     def part(self, part: Any) -> dict[str, Any]:
         """Pose, shapes and surface of a body or link."""

@@ -5,8 +5,10 @@ from __future__ import annotations
 import importlib
 import inspect
 import math
+import signal
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from types import ModuleType
 from typing import Any, ClassVar
 
@@ -80,6 +82,17 @@ def lazy_import(name: str) -> Any:
     submodules are imported by naming them: `lazy_import("engine.viewer")`.
     """
     return _LazyModule(name)
+
+
+@contextmanager
+def signals_kept(*numbers: signal.Signals) -> Iterator[None]:
+    """Meanwhile an engine may replace Python's handlers of these signals; they are put back."""
+    kept = {number: signal.getsignal(number) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
 
 
 class Simulator(ABC):

@@ -31,7 +31,7 @@ from pytest_simbench.simulator import (
 )
 
 from ..mujoco.bounces import BOUNCES, direct
-from ..mujoco.own_file import loaded, of_file
+from ..mujoco.own_file import loaded
 from .engine import (
     OLDEST,
     array_of,
@@ -95,11 +95,6 @@ class Genesis(Simulator):
     _robot: Any = None
     compiled: ClassVar[set[tuple[Any, ...]]] = set()
     """What this process has kernels for, see `compile`."""
-
-    def __init__(self, settings: Any, *, gui: bool = False) -> None:
-        super().__init__(settings, gui=gui)
-        if isinstance(settings, GenesisFileSettings):
-            vars(self)["info"] = of_file(self.info)
 
     def compile(self, scene: Scene) -> None:
         """Build and step such a world once; kernels depend on options and on the kinds of bodies.
