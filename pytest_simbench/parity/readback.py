@@ -18,7 +18,7 @@ from pytest_simbench.description.shapes import Outline, outlines
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.parity.quantities import named, touches
 from pytest_simbench.scene import Body, Coupling, FloatArray, Robot, Scene
-from pytest_simbench.simulator.base import Simulator
+from pytest_simbench.simulator.base import Simulator, named_parts
 
 
 class ReadBack(ABC):
@@ -130,24 +130,19 @@ class ReadBack(ABC):
 
     def touches(self) -> dict[str, Any]:
         """What can collide with what: all of the shapes of two parts, of two links any."""
-        return touches(self.scene, self.prepared, self._can_touch)
+        parts = named_parts(self.ground, self.bodies, self.links)
+
+        def can_touch(a: str, b: str) -> bool:
+            found = np.asarray(self.collide(parts[a], parts[b]), dtype=bool)
+            if a.startswith("link/") and b.startswith("link/"):
+                return bool(found.any())
+            return bool(found.size and found.all())
+
+        return touches(self.scene, self.prepared, can_touch)
 
     def collide(self, first: Any, second: Any) -> Any:
         """Whether shapes of two parts can collide: of each of one and each of the other, (n, m)."""
         raise NotImplementedError
-
-    def _can_touch(self, a: str, b: str) -> bool:
-        found = np.asarray(self.collide(self._named(a), self._named(b)), dtype=bool)
-        if a.startswith("link/") and b.startswith("link/"):
-            return bool(found.any())
-        return bool(found.size and found.all())
-
-    def _named(self, name: str) -> Any:
-        """The part of "ground", `body/NAME` or `link/NAME`."""
-        kind, _, rest = name.partition("/")
-        if kind == "ground":
-            return self.ground
-        return self.bodies[rest] if kind == "body" else self.links[rest]
 
 
 def felt(force: FloatArray, mass: float, gravity: FloatArray) -> float:

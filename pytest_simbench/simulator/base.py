@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,8 @@ from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.scene import FloatArray, Scene, Vector3
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.settings import Settings
+
+Part = TypeVar("Part")
 
 TIMES = 1e4
 """What strikes a heavy body moves it by this part of its own change of velocity, for one step. With
@@ -57,6 +59,15 @@ def view_axes() -> FloatArray:
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     return np.column_stack([right, np.cross(ahead, right), ahead])
+
+
+def named_parts(
+    ground: Part, bodies: Mapping[str, Part], links: Mapping[str, Part]
+) -> dict[str, Part]:
+    """What an engine has for ground, bodies and links, by their names in contacts and in pairs that
+    are kept apart: "ground", `body/NAME` and `link/NAME`."""
+    found = {f"body/{name}": part for name, part in bodies.items()}
+    return {"ground": ground, **found, **{f"link/{name}": part for name, part in links.items()}}
 
 
 def chosen_on(*tuned: Seen, real: tuple[Seen, ...] = ()) -> Mapping[str, tuple[Seen, ...]]:
