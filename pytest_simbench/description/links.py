@@ -40,9 +40,16 @@ def motion_subspace(joint: MovingJoint) -> FloatArray:
     Angular velocity first [rad/s], then the linear velocity of the frame's origin [m/s]
     (Featherstone, Rigid Body Dynamics Algorithms, section 3.5).
     """
-    axis = _unit(joint.axis)
-    still = np.zeros(3)
-    return np.concatenate([axis, still] if joint.kind == "revolute" else [still, axis])
+    return subspace(_unit(joint.axis), slides=joint.kind != "revolute")
+
+
+def subspace(direction: FloatArray, point: FloatArray | None = None, *, slides: bool) -> FloatArray:
+    """The same of a joint along or about a unit vector, (6,); a hinge is at a point [m], None: at
+    the frame's origin."""
+    if slides:
+        return np.concatenate([np.zeros(3), direction])
+    linear = np.zeros(3) if point is None else np.cross(point, direction)
+    return np.concatenate([direction, linear])
 
 
 def _unit(axis: Vector3) -> FloatArray:

@@ -18,7 +18,7 @@ from pytest_simbench.description.shapes import Outline, outlines
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.parity.quantities import named, touches
 from pytest_simbench.scene import Body, Coupling, FloatArray, Robot, Scene
-from pytest_simbench.simulator.base import Simulator
+from pytest_simbench.simulator.base import Simulator, named_parts
 
 
 class ReadBack(ABC):
@@ -35,7 +35,10 @@ class ReadBack(ABC):
 
     Attributes:
         scene, prepared: the adapter's; the reduced robot is None in a scene without one.
+        grounded: whether the world has a ground, as each but that of a user's file has.
     """
+
+    grounded = True
 
     def __init__(
         self, simulator: Any, ground: Any, bodies: Mapping[str, Any], links: Mapping[str, Any]
@@ -67,7 +70,8 @@ class ReadBack(ABC):
                     reported[f"coupling/{pair.follower}"] = told
             coupled = self.coupled(robot.gripper.couplings)
             reported |= {} if coupled is None else {"gripper/coupled": float(coupled)}
-        return reported | self.touches()
+        reported |= self.touches()
+        return {k: v for k, v in reported.items() if self.grounded or "ground/" not in k}
 
     def part(self, part: Any) -> dict[str, Any]:
         """Pose, shapes and surface of a body or link."""
@@ -126,24 +130,19 @@ class ReadBack(ABC):
 
     def touches(self) -> dict[str, Any]:
         """What can collide with what: all of the shapes of two parts, of two links any."""
-        return touches(self.scene, self.prepared, self._can_touch)
+        parts = named_parts(self.ground, self.bodies, self.links)
+
+        def can_touch(a: str, b: str) -> bool:
+            found = np.asarray(self.collide(parts[a], parts[b]), dtype=bool)
+            if a.startswith("link/") and b.startswith("link/"):
+                return bool(found.any())
+            return bool(found.size and found.all())
+
+        return touches(self.scene, self.prepared, can_touch)
 
     def collide(self, first: Any, second: Any) -> Any:
         """Whether shapes of two parts can collide: of each of one and each of the other, (n, m)."""
         raise NotImplementedError
-
-    def _can_touch(self, a: str, b: str) -> bool:
-        found = np.asarray(self.collide(self._named(a), self._named(b)), dtype=bool)
-        if a.startswith("link/") and b.startswith("link/"):
-            return bool(found.any())
-        return bool(found.size and found.all())
-
-    def _named(self, name: str) -> Any:
-        """The part of "ground", `body/NAME` or `link/NAME`."""
-        kind, _, rest = name.partition("/")
-        if kind == "ground":
-            return self.ground
-        return self.bodies[rest] if kind == "body" else self.links[rest]
 
 
 def felt(force: FloatArray, mass: float, gravity: FloatArray) -> float:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import importlib
 import inspect
 import math
+import signal
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,8 @@ from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.scene import FloatArray, Scene, Vector3
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.settings import Settings
+
+Part = TypeVar("Part")
 
 TIMES = 1e4
 """What strikes a heavy body moves it by this part of its own change of velocity, for one step. With
@@ -57,6 +61,15 @@ def view_axes() -> FloatArray:
     return np.column_stack([right, np.cross(ahead, right), ahead])
 
 
+def named_parts(
+    ground: Part, bodies: Mapping[str, Part], links: Mapping[str, Part]
+) -> dict[str, Part]:
+    """What an engine has for ground, bodies and links, by their names in contacts and in pairs that
+    are kept apart: "ground", `body/NAME` and `link/NAME`."""
+    found = {f"body/{name}": part for name, part in bodies.items()}
+    return {"ground": ground, **found, **{f"link/{name}": part for name, part in links.items()}}
+
+
 def chosen_on(*tuned: Seen, real: tuple[Seen, ...] = ()) -> Mapping[str, tuple[Seen, ...]]:
     """What the settings of an adapter were chosen on, by profile: `tuned` on seeds, `real` on these
     and on each third toss of those that are not held out, and on what else is named."""
@@ -80,6 +93,17 @@ def lazy_import(name: str) -> Any:
     submodules are imported by naming them: `lazy_import("engine.viewer")`.
     """
     return _LazyModule(name)
+
+
+@contextmanager
+def signals_kept(*numbers: signal.Signals) -> Iterator[None]:
+    """Meanwhile an engine may replace Python's handlers of these signals; they are put back."""
+    kept = {number: signal.getsignal(number) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in kept.items():
+            signal.signal(number, handler)
 
 
 class Simulator(ABC):

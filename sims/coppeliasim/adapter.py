@@ -23,6 +23,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     UnavailableError,
 )
+from pytest_simbench.simulator.base import named_parts
 
 from . import library as program
 from . import world as build
@@ -157,9 +158,8 @@ class CoppeliaSim(Simulator):
         return sum(1 for _ in self._contacts())
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        names = {self._ground.handle: "ground"}
-        for kind, parts in (("body", self._bodies), ("link", self._links)):
-            names |= {part.handle: f"{kind}/{name}" for name, part in parts.items()}
+        parts = named_parts(self._ground, self._bodies, self._links)
+        names = {part.handle: name for name, part in parts.items()}
         for (first, second), row in self._contacts():
             wrench = np.concatenate([row[3:], np.cross(row[:3], row[3:])])
             yield names[first], names[second], wrench

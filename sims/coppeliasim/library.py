@@ -14,8 +14,7 @@ import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.simulator import SimulatorError, UnavailableError
+from pytest_simbench.simulator.base import signals_kept
 
 ROOT = "COPPELIASIM_ROOT_DIR"
 """Variable that names the program's folder, as the program's own clients read it."""
@@ -132,16 +132,6 @@ def _folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="simbench-coppeliasim-"))
 
 
-@contextmanager
-def _signals_kept() -> Iterator[None]:
-    kept = {number: signal.getsignal(number) for number in HANDLED}
-    try:
-        yield
-    finally:
-        for number, handler in kept.items():
-            signal.signal(number, handler)
-
-
 def start() -> None:
     """Start the program, with an empty scene."""
     made = library()
@@ -150,7 +140,7 @@ def start() -> None:
     own.write_text(SETTINGS, "utf-8")
     before = {name: os.environ.get(name) for name in FOLDERS}
     os.environ.update(dict.fromkeys(FOLDERS, str(_folder())))
-    with _signals_kept():
+    with signals_kept(*HANDLED):
         made.simInitialize(os.fsencode(root()), 0)
     for name, value in before.items():
         os.environ.pop(name) if value is None else os.environ.update({name: value})
@@ -159,7 +149,7 @@ def start() -> None:
 def end() -> None:
     """End the program, and remove what it wrote."""
     sys.stderr.flush()
-    with _signals_kept():
+    with signals_kept(*HANDLED):
         library().simDeinitialize()
     shutil.rmtree(_folder(), ignore_errors=True)
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import subspace
 from pytest_simbench.description.shapes import (
     Outline,
     a_box,
@@ -185,10 +186,8 @@ class ReadBack(readback.ReadBack):
         """Velocity of the child's frame at unit joint speed, in that frame: angular, linear."""
         # By where the child was put: an engine lets bodies drift from their joints.
         frame: Pose = (local_pose(child.handle) * child.frame).inverse()
-        direction = frame.rotation()[:, 2]
-        if get_int(handle, "jointType") != REVOLUTE:
-            return np.concatenate([np.zeros(3), direction])
-        return np.concatenate([direction, np.cross(frame.position, direction)])
+        slides = get_int(handle, "jointType") != REVOLUTE
+        return subspace(frame.rotation()[:, 2], np.asarray(frame.position), slides=slides)
 
     def coupling(self, pair: Coupling) -> FloatArray | None:
         leader, offset, ratio = c_int(), c_double(), c_double()

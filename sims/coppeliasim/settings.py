@@ -9,6 +9,8 @@ from typing import Annotated, Any, Literal
 from pytest_simbench.simulator import Seen, Settings
 from pytest_simbench.simulator.settings import EACH, Each, Linear, Log
 
+from ..mujoco.settings import Solimp, Solref
+
 Engine = Literal["bullet", "bullet283", "ode", "newton", "mujoco"]
 Drive = Literal["position", "velocity", "force"]
 
@@ -43,12 +45,8 @@ class CoppeliaSimSettings(Settings):
     sticky: Annotated[bool, Each(("engine", "bullet"))] = False
 
     cone: Annotated[Literal["pyramidal", "elliptic"], MUJOCO] = "pyramidal"
-    solref: tuple[Annotated[float, Log(0.001, 0.05)], Annotated[float, Log(0.5, 4)]] = (0.02, 1.0)
-    solimp: tuple[
-        Annotated[float, Linear(0.5, 0.999)],
-        Annotated[float, Linear(0.9, 0.9999)],
-        Annotated[float, Log(1e-4, 0.01)],
-    ] = (0.9, 0.95, 0.001)
+    solref: Solref = (0.02, 1.0)
+    solimp: Solimp = (0.9, 0.95, 0.001)
 
     def quantities(self) -> Mapping[str, Any]:
         found = {} if self.engine == "mujoco" else {"joint/*/armature": 0.0}

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import subspace
 from pytest_simbench.description.shapes import OUTLINES, Outline, a_box, a_cylinder, a_mesh, a_round
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import felt, one_value
@@ -192,8 +193,6 @@ def _rest(spring: Any, context: Any) -> float:
 def _axis(joint: Any) -> FloatArray:
     """Motion subspace of a joint in the frame of its child."""
     frame = joint.frame_on_child().GetFixedPoseInBodyFrame()
-    still = np.zeros(3)
-    if isinstance(joint, trees.PrismaticJoint):
-        return np.concatenate([still, frame.rotation() @ joint.translation_axis()])
-    axis = frame.rotation() @ joint.revolute_axis()
-    return np.concatenate([axis, np.cross(frame.translation(), axis)])
+    slides = isinstance(joint, trees.PrismaticJoint)
+    axis = joint.translation_axis() if slides else joint.revolute_axis()
+    return subspace(frame.rotation() @ axis, frame.translation(), slides=slides)

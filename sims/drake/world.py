@@ -10,7 +10,7 @@ import numpy as np
 
 from pytest_simbench.description.links import OPEN, borne, ends, frames, joined, reduced
 from pytest_simbench.description.shapes import mesh_points
-from pytest_simbench.description.urdf import Link, MovingJoint, Shape
+from pytest_simbench.description.urdf import MovingJoint, Shape
 from pytest_simbench.scene import (
     Body,
     Box,
@@ -165,10 +165,7 @@ class World:
             if part.moments is None and weighted:
                 inertia = getattr(trees.SpatialInertia, weighted)(part.mass, *arguments)
             else:
-                central = trees.RotationalInertia(*part.inertia())
-                inertia = trees.SpatialInertia.MakeFromCentralInertia(
-                    part.mass, np.zeros(3), central
-                )
+                inertia = _inertia(part.mass, np.zeros(3), np.diag(part.inertia()))
             own = trees.default_model_instance()
             body, pose = self.plant.AddRigidBody(part.name, own, inertia), Pose()
             if part.damping.any():
@@ -193,11 +190,9 @@ class World:
     def _add_heavy(self, part: Body) -> Any:
         """A body that nothing moves, without weight; Drake has none that move as prescribed."""
         plant, mass = self.plant, heavy(self.scene)
-        central = trees.RotationalInertia(mass, mass, mass)
         alone = plant.AddModelInstance(f"{part.name}/prescribed")
         plant.mutable_gravity_field().set_enabled(alone, False)
-        inertia = trees.SpatialInertia.MakeFromCentralInertia(mass, np.zeros(3), central)
-        return plant.AddRigidBody(part.name, alone, inertia)
+        return plant.AddRigidBody(part.name, alone, _inertia(mass, np.zeros(3), mass * np.eye(3)))
 
     def _damp(self, body: Any, part: Body) -> None:
         """The damping of a floating joint, whose torque is the same about all axes."""
@@ -224,7 +219,8 @@ class World:
         plant, robot = self.plant, prepared.robot
         self.model = plant.AddModelInstance(robot.name)
         for link in prepared.links.values():
-            body = plant.AddRigidBody(link.name, self.model, _inertia(link))
+            weight = _inertia(link.mass, link.centre, link.inertia)
+            body = plant.AddRigidBody(link.name, self.model, weight)
             self.links[link.name] = body
             for k, shape in enumerate(link.shapes):
                 made = _robot_shape(shape, f"{link.name}_{k}")
@@ -342,12 +338,12 @@ def transform(pose: Pose) -> Any:
     return math.RigidTransform(eigen.Quaternion(q / np.linalg.norm(q)), pose.position)
 
 
-def _inertia(link: Link) -> Any:
-    if link.mass == 0:
+def _inertia(mass: float, centre: FloatArray, i: FloatArray) -> Any:
+    """Of a mass [kg] with its centre (3,) [m] and the inertia about it (3, 3) [kg m^2]."""
+    if mass == 0:
         return trees.SpatialInertia.Zero()
-    i = link.inertia
     central = trees.RotationalInertia(i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
-    return trees.SpatialInertia.MakeFromCentralInertia(link.mass, link.centre, central)
+    return trees.SpatialInertia.MakeFromCentralInertia(mass, centre, central)
 
 
 def _robot_shape(shape: Shape, label: str) -> Any:

@@ -139,9 +139,7 @@ class Gazebo(Simulator):
     def load(self, scene: Scene) -> None:
         self.begin(scene)
         s = self.settings
-        self._physics = Physics(
-            s.engine, s.timestep, s.detector, s.solver, s.torsional_friction, is_lone(scene)
-        )
+        self._physics = Physics(s, is_lone(scene))
         name = new_name()
         self._files = tempfile.TemporaryDirectory(prefix="simbench-gazebo-")  # of bodies' meshes
         folder = Path(self._files.name)

@@ -17,6 +17,7 @@ from urllib.parse import unquote, urlparse
 
 import numpy as np
 
+from pytest_simbench.description.links import subspace
 from pytest_simbench.description.shapes import (
     Outline,
     a_box,
@@ -213,9 +214,8 @@ def _motion(joint: ET.Element, axis: ET.Element) -> FloatArray:
     frame: Pose = pose_in(joint)  # in the child's
     direction = frame.rotation() @ numbers(xyz)
     direction = direction / np.linalg.norm(direction)
-    if joint.get("type") == "prismatic":
-        return np.concatenate([np.zeros(3), direction])
-    return np.concatenate([direction, np.cross(frame.position, direction)])
+    slides = joint.get("type") == "prismatic"
+    return subspace(direction, np.asarray(frame.position), slides=slides)
 
 
 def vector(found: Any) -> FloatArray:

@@ -28,6 +28,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 
+from .settings import GazeboSettings
 from .window import add_drawing
 
 VERSION = "1.11"
@@ -41,20 +42,15 @@ class Physics:
     """What a world says of its engine.
 
     Attributes:
-        engine: `dartsim` or `bullet-featherstone`.
-        timestep: [s].
-        detector: collision detector of dartsim.
-        solver: of dartsim.
-        torsional_friction: of bullet-featherstone, for each surface [m].
         lone: whether the world is one free body on the ground and nothing else.
     """
 
-    engine: str
-    timestep: float
-    detector: str
-    solver: str
-    torsional_friction: float = 1.0
+    settings: GazeboSettings
     lone: bool = False
+
+    @property
+    def engine(self) -> str:
+        return self.settings.engine
 
     @property
     def coupled(self) -> bool:
@@ -73,11 +69,11 @@ class Physics:
         bullet-featherstone makes the motor, and computes its largest impulse, before the world has
         told it the step: it takes one of 1 ms (`JointFeatures.cc`, `maxEffort * world->stepSize`).
         """
-        return limit * self.timestep / 1e-3 if self.engine == FEATHERSTONE else limit
+        return limit * self.settings.timestep / 1e-3 if self.engine == FEATHERSTONE else limit
 
     def effort_of(self, written: float) -> float:
         """The limit for which `effort` wrote this."""
-        return written * 1e-3 / self.timestep if self.engine == FEATHERSTONE else written
+        return written * 1e-3 / self.settings.timestep if self.engine == FEATHERSTONE else written
 
     def friction(self, coefficient: float, ground: bool = False) -> float:
         """What to write so that a pair of such surfaces has this coefficient.
@@ -149,11 +145,11 @@ def robot_model(scene: Scene) -> str:
 
 def _add_physics(world: ET.Element, physics: Physics) -> None:
     element = ET.SubElement(world, "physics", name="physics", type="ignored")
-    _text(element, "max_step_size", repr(physics.timestep))
+    _text(element, "max_step_size", repr(physics.settings.timestep))
     _text(element, "real_time_factor", "0")  # do not wait for the clock
     dart = ET.SubElement(element, "dart")
-    _text(dart, "collision_detector", physics.detector)
-    _text(ET.SubElement(dart, "solver"), "solver_type", physics.solver)
+    _text(dart, "collision_detector", physics.settings.detector)
+    _text(ET.SubElement(dart, "solver"), "solver_type", physics.settings.solver)
     system = ET.SubElement(
         world, "plugin", filename="gz-sim-physics-system", name="gz::sim::systems::Physics"
     )
@@ -285,7 +281,7 @@ def _add_surface(
         _text(own, name.partition("/")[2], repr(mu))
     if physics.engine == FEATHERSTONE:  # dartsim only warns that it has none
         torsional = ET.SubElement(element, "torsional")
-        _text(torsional, "coefficient", repr(physics.torsional_friction))
+        _text(torsional, "coefficient", repr(physics.settings.torsional_friction))
 
 
 def _add_inertial(link: ET.Element, mass: float, pose: Pose, tensor: Iterable[float]) -> None:

@@ -28,6 +28,7 @@ from typing import Any
 from uuid import uuid4
 
 from pytest_simbench.simulator import SimulatorError, UnavailableError
+from pytest_simbench.simulator.base import signals_kept
 
 RELEASES: dict[str, tuple[str, str, str]] = {
     "8 (Harmonic)": ("gz.math7", "gz.transport13", "gz.sim8"),
@@ -114,7 +115,7 @@ class Server:
         with tempfile.TemporaryDirectory(prefix="simbench-gazebo-") as folder, _told() as told:
             path = Path(folder) / "world.sdf"
             path.write_text(text, "utf-8")
-            with _signals_kept():
+            with signals_kept(*HANDLED):
                 self._fixture = bindings().sim.TestFixture(str(path))
             self._fixture.on_pre_update(self._seen)
             self._fixture.finalize()
@@ -173,17 +174,6 @@ def _own_partition() -> None:
     """Messages of this process and of no other: servers of one partition hear each other."""
     os.environ["GZ_PARTITION"] = f"simbench-{os.getpid()}-{uuid4().hex[:12]}"
     os.environ.setdefault("GZ_IP", "127.0.0.1")
-
-
-@contextmanager
-def _signals_kept() -> Iterator[None]:
-    """Python's handlers of signals, which a server replaces by its own."""
-    kept = {number: signal.getsignal(number) for number in HANDLED}
-    try:
-        yield
-    finally:
-        for number, handler in kept.items():
-            signal.signal(number, handler)
 
 
 @contextmanager

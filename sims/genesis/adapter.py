@@ -29,9 +29,10 @@ from pytest_simbench.simulator import (
     heavy,
     lazy_import,
 )
+from pytest_simbench.simulator.base import named_parts
 
 from ..mujoco.bounces import BOUNCES, direct
-from ..mujoco.own_file import loaded, of_file
+from ..mujoco.own_file import loaded
 from .engine import (
     OLDEST,
     array_of,
@@ -95,11 +96,6 @@ class Genesis(Simulator):
     _robot: Any = None
     compiled: ClassVar[set[tuple[Any, ...]]] = set()
     """What this process has kernels for, see `compile`."""
-
-    def __init__(self, settings: Any, *, gui: bool = False) -> None:
-        super().__init__(settings, gui=gui)
-        if isinstance(settings, GenesisFileSettings):
-            vars(self)["info"] = of_file(self.info)
 
     def compile(self, scene: Scene) -> None:
         """Build and step such a world once; kernels depend on options and on the kinds of bodies.
@@ -200,11 +196,10 @@ class Genesis(Simulator):
 
     def _links(self) -> dict[str, Any]:
         """What the engine has for "ground", each `body/NAME` and `link/NAME`."""
-        links = {"ground": self._ground.links[0]}
-        links |= {f"body/{name}": body.links[0] for name, body in self._boxes.items()}
-        if self.prepared is not None:
-            links |= {f"link/{name}": self._robot.get_link(name) for name in self.prepared.links}
-        return links
+        bodies = {name: body.links[0] for name, body in self._boxes.items()}
+        names = () if self.prepared is None else self.prepared.links
+        links = {name: self._robot.get_link(name) for name in names}
+        return named_parts(self._ground.links[0], bodies, links)
 
     def _start_bodies(self, scene: Scene) -> None:
         """Velocities and damping of free bodies: linear in the world's axes, angular in the

@@ -194,14 +194,10 @@ class FileReadBack(ReadBack):
         super().__init__(simulator)
         self.imported, self.prepared = imported, None
         self.bodies, self.ground = imported.parts, imported.ground
-
-    def all(self) -> dict[str, Any]:
-        if self.ground.geoms:
-            return super().all()
-        return {name: value for name, value in super().all().items() if "ground/" not in name}
+        self.grounded = bool(self.ground.geoms)
 
     def height(self) -> float:
-        return super().height() + self.imported.own.lift if self.ground.geoms else np.nan
+        return super().height() + self.imported.own.lift if self.grounded else np.nan
 
     def pose(self, part: Any) -> FloatArray:
         found = self.imported.pose(part.idx) * part.frame

@@ -13,13 +13,7 @@ from pytest_simbench.description.carried import CARRIED, named
 from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.pose import quaternion_product
-from pytest_simbench.simulator import (
-    Capability,
-    Deviation,
-    NotSupportedError,
-    SimulatorInfo,
-    lazy_import,
-)
+from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
 
 from .account import values_of
 from .readback import Numbers, Part, ReadBack, contact_forces
@@ -53,16 +47,11 @@ OF_JOINTS = "joint/* link/* gripper/* closure/* coupling/* body/*/touches ground
 """Quantities of joints and links, which are not read back of a file."""
 
 
-def of_file(info: SimulatorInfo, deviations: Iterable[Deviation] = ()) -> SimulatorInfo:
-    """Facts about an engine that imports a file, which may hold what no scene of it does."""
-    able = info.capabilities | Capability.named("compound loops couplings apart self_collide")
-    return replace(info, capabilities=able, deviations=(*info.deviations, *deviations))
-
-
 def loaded(simulator: Any, own: Any, methods: str = "contact_forces numbers") -> None:
     """Have an adapter's instance tell and command what its file's world has: with these methods of
     `own` for its own ones, and facts of this world alone."""
-    vars(simulator)["info"] = of_file(type(simulator).info, own.deviations())
+    info = type(simulator).info
+    vars(simulator)["info"] = replace(info, deviations=(*info.deviations, *own.deviations()))
     for name in ("command", "body_state", "joint_state", *methods.split()):
         vars(simulator)[name] = getattr(own, name)
 
@@ -197,16 +186,12 @@ class FileReadBack(ReadBack):
         self.own = own
         super().__init__(simulator, own.model, own.data, own.numbers())
         self.prepared = None  # joints and links are not read back
+        self.grounded = own.reading.ground is not None
 
     def world(self) -> dict[str, Any]:
         found = super().world()
         found["ground/height"] += self.own.reading.lift
         return found
-
-    def all(self) -> dict[str, Any]:
-        if self.own.reading.ground is not None:
-            return super().all()
-        return {name: value for name, value in super().all().items() if "ground/" not in name}
 
     def pose(self, part: Part) -> FloatArray:
         found = super().pose(part)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import subspace
 from pytest_simbench.description.shapes import NO_REACH, Outline, a_box, a_cylinder, a_mesh, a_round
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
@@ -240,8 +241,6 @@ class ReadBack(readback.ReadBack):
     def joint(self, name: str) -> dict[str, Any]:
         model, joint = self.model, self.at.joints[name]
         dof = model.jnt_dofadr[joint]
-        axis, still = model.jnt_axis[joint], np.zeros(3)
-        turning = [axis, np.cross(model.jnt_pos[joint], axis)]
         slides = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
         drive = int(np.flatnonzero(model.actuator_trnid[:, 0] == joint)[0])
         gear = model.actuator_gear[drive, 0]
@@ -257,7 +256,7 @@ class ReadBack(readback.ReadBack):
         spring = np.ravel(model.jnt_stiffness[joint])[0]
         rest = {"rest": model.qpos_spring[model.jnt_qposadr[joint]]} if spring else {}
         return rest | {
-            "axis": np.concatenate([still, axis] if slides else turning),
+            "axis": subspace(model.jnt_axis[joint], model.jnt_pos[joint], slides=slides),
             "limits": limits,
             "effort_limit": one_value(ends or np.inf),
             "stiffness": spring + drives * one_value([gain[0] * gear, -bias[1] * gear**2]),

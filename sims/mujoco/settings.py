@@ -9,6 +9,16 @@ from typing import Annotated, Literal
 from pytest_simbench.simulator import Seen, Settings, chosen_on
 from pytest_simbench.simulator.settings import EACH, Linear, Log
 
+Solref = tuple[Annotated[float, Log(0.001, 0.05)], Annotated[float, Log(0.5, 4)]]
+"""Time constant [s] and damping ratio of contacts."""
+
+Solimp = tuple[
+    Annotated[float, Linear(0.5, 0.999)],
+    Annotated[float, Linear(0.9, 0.9999)],
+    Annotated[float, Log(1e-4, 0.01)],
+]
+"""Impedance of contacts: minimum, maximum, width [m]."""
+
 
 @dataclass(frozen=True)
 class MuJoCoSettings(Settings):
@@ -35,12 +45,8 @@ class MuJoCoSettings(Settings):
     cone: Annotated[Literal["pyramidal", "elliptic"], EACH] = "pyramidal"
     impratio: Annotated[float, Log(1, 100)] = 1.0
     condim: Literal[3, 4, 6] = 3
-    solref: tuple[Annotated[float, Log(0.001, 0.05)], Annotated[float, Log(0.5, 4)]] = (0.02, 1.0)
-    solimp: tuple[
-        Annotated[float, Linear(0.5, 0.999)],
-        Annotated[float, Linear(0.9, 0.9999)],
-        Annotated[float, Log(1e-4, 0.01)],
-    ] = (0.9, 0.95, 0.001)
+    solref: Solref = (0.02, 1.0)
+    solimp: Solimp = (0.9, 0.95, 0.001)
     noslip_iterations: Annotated[int, Linear(0, 20)] = 0
 
 

@@ -30,7 +30,7 @@ from pytest_simbench.simulator import (
 )
 
 from ..mujoco.bounces import BOUNCES, direct
-from ..mujoco.own_file import FileReadBack, loaded, of_file
+from ..mujoco.own_file import FileReadBack, loaded
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from ..mujoco.settings import FileSettings
@@ -96,11 +96,6 @@ class Newton(Simulator):
     _own_file: NewtonFile | None = None
     _ctrl: Any = None
     _compiled: ClassVar[set[bool]] = set()
-
-    def __init__(self, settings: Any, *, gui: bool = False) -> None:
-        super().__init__(settings, gui=gui)
-        if isinstance(settings, FileSettings):
-            vars(self)["info"] = of_file(self.info)
 
     def compile(self, scene: Scene) -> None:
         """Load the world once and step it: Warp then has every kernel, on disk and in memory.

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 from pytest_simbench.simulator import Seen, Settings
-from pytest_simbench.simulator.settings import EACH, Linear, Log
+from pytest_simbench.simulator.settings import EACH, Log
 
-from ..mujoco.settings import FileSettings
+from ..mujoco.settings import FileSettings, Solimp
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,7 @@ class NewtonSettings(Settings):
     condim: Literal[3, 4, 6] = 3
     ke: Annotated[float, Log(1e3, 1e6)] = 2500.0
     kd: Annotated[float, Log(30, 3000)] = 100.0
-    solimp: tuple[
-        Annotated[float, Linear(0.5, 0.999)],
-        Annotated[float, Linear(0.9, 0.9999)],
-        Annotated[float, Log(1e-4, 0.01)],
-    ] = (0.9, 0.95, 0.001)
+    solimp: Solimp = (0.9, 0.95, 0.001)
     gap: float = 0.1
 
 

@@ -24,6 +24,7 @@ from pytest_simbench.simulator import (
     SimulatorInfo,
     lazy_import,
 )
+from pytest_simbench.simulator.base import named_parts
 
 from . import world as build
 from .axes import Axis
@@ -120,8 +121,9 @@ class ODE(Simulator):
         self._drives: Drives | None = None
         if self.prepared is not None:
             self._load_robot(self.prepared)
+        self._parts = named_parts(self._ground, self._bodies, self._links)
         for pair in scene.apart:
-            self.contacts.apart.add(frozenset(id(self._part(name).surface) for name in pair))
+            self.contacts.apart.add(frozenset(id(self._parts[name].surface) for name in pair))
         links = [part.body for part in self._links.values() if part.body is not None]
         self._moving = [*self._free, *links]
         if self._drives is not None:
@@ -152,11 +154,6 @@ class ODE(Simulator):
         """Pull at links that feel a share of gravity, in the next step."""
         for body, force in self._borne:
             body.addForce(force)
-
-    def _part(self, name: str) -> Part:
-        """Of "ground", `body/NAME` or `link/NAME`."""
-        kind, _, rest = name.partition("/")
-        return {"ground": {"": self._ground}, "body": self._bodies, "link": self._links}[kind][rest]
 
     def read_back(self) -> dict[str, Any]:
         return ReadBack(self).all()
@@ -241,9 +238,7 @@ class ODE(Simulator):
         return len(self.contacts.made)
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        names = {id(self._ground.surface): "ground"}
-        for kind, parts in (("body", self._bodies), ("link", self._links)):
-            names |= {id(part.surface): f"{kind}/{name}" for name, part in parts.items()}
+        names = {id(part.surface): name for name, part in self._parts.items()}
         for first, second, wrench in self.contacts.forces():
             yield names[id(first)], names[id(second)], wrench
 

@@ -54,11 +54,7 @@ class Axis:
         it is told its angle, and adds nothing to the world but at its stops.
         """
         if self.wide:
-            self.stops = ode.AMotor(world)
-            self.stops.attach(self.child, self.parent)
-            self.stops.setNumAxes(1)
-            self.stops.setAxis(0, 1, self.joint.getAxis())  # 1: turns with the child
-            self.stops.setFeedback(True)
+            self.stops = self._beside(world)
         self.stops.setParam(LO_STOP, lower)
         self.stops.setParam(HI_STOP, upper)
 
@@ -68,6 +64,11 @@ class Axis:
         Of a slider it is that of a second slider: ODE's motors along an axis pull at centres of
         mass, and so turn two bodies whose centres are not upon it.
         """
+        self.motors.append(made := self._beside(world))
+        return made
+
+    def _beside(self, world: Any) -> Any:
+        """A joint of ODE's that can be a motor along this one's axis."""
         made = ode.AMotor(world) if self.hinged else ode.SliderJoint(world)
         made.attach(self.child, self.parent)
         if self.hinged:
@@ -76,7 +77,6 @@ class Axis:
         else:
             made.setAxis(self.joint.getAxis())
         made.setFeedback(True)
-        self.motors.append(made)
         return made
 
     def inertia(self) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import subspace
 from pytest_simbench.description.shapes import (
     DIRECTIONS,
     Outline,
@@ -187,7 +188,7 @@ def _collide(x: int, y: int) -> bool:
 def _motion(axis: Axis, frame: Pose) -> FloatArray:
     """Velocity of the child's frame at unit joint speed, in that frame: angular, linear, (6,)."""
     turn, direction = frame.rotation().T, np.array(axis.joint.getAxis())
-    if not axis.hinged:
-        return np.concatenate([np.zeros(3), turn @ direction])
-    arm = np.asarray(frame.position) - axis.joint.getAnchor()
-    return np.concatenate([turn @ direction, turn @ np.cross(direction, arm)])
+    anchor = axis.joint.getAnchor() if axis.hinged else frame.position
+    return subspace(
+        turn @ direction, turn @ np.subtract(anchor, frame.position), slides=not axis.hinged
+    )

@@ -29,7 +29,7 @@ from pytest_simbench.simulator import (
     heavy,
     lazy_import,
 )
-from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT
+from pytest_simbench.simulator.base import EYE, FIELD_OF_VIEW, LOOK_AT, named_parts
 
 from .anchors import Anchors
 from .joints import Drives, Pushed, couple, rub
@@ -148,16 +148,14 @@ class PyBullet(Simulator):
         self._links: dict[str, int] = {}
         if self.prepared is not None:
             self._load_robot(self.prepared)
+        self._parts = named_parts(  # Bullet's numbers of body and link
+            (self._ground, -1),
+            {name: (body, -1) for name, body in self._bodies.items()},
+            {name: (self._robot, link) for name, link in self._links.items()},
+        )
         for pair in scene.apart:
-            (first, a), (second, b) = map(self._part, pair)
+            (first, a), (second, b) = (self._parts[name] for name in pair)
             pybullet.setCollisionFilterPair(first, second, a, b, 0, c)
-
-    def _part(self, name: str) -> tuple[int, int]:
-        """Bullet's numbers of the body and link of "ground", `body/NAME` or `link/NAME`."""
-        kind, _, rest = name.partition("/")
-        if kind == "link":
-            return self._robot, self._links[rest]
-        return (self._bodies[rest] if rest else self._ground), -1
 
     def _part_from_still(self, scene: Scene) -> None:
         """Prescribed bodies do not touch what nothing can move."""
@@ -297,14 +295,9 @@ class PyBullet(Simulator):
             self.command(*commanded)
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
-        links = {number: f"link/{name}" for name, number in self._links.items()}
-        names = {body: f"body/{name}" for name, body in self._bodies.items()}
-        names[self._ground] = "ground"
+        names = {part: name for name, part in self._parts.items()}
         for point in pybullet.getContactPoints(physicsClientId=self.client) or ():
-            first, second = (
-                links[link] if body == self._robot else names[body]
-                for body, link in ((point[1], point[3]), (point[2], point[4]))
-            )
+            first, second = names[point[1], point[3]], names[point[2], point[4]]
             force = np.array([point[9], point[10], point[12]]) @ [point[7], point[11], point[13]]
             yield first, second, np.concatenate([force, np.cross(point[5], force)])
 

@@ -22,7 +22,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.simulator import NotSupportedError, lazy_import
 
-from .drawing import UPRIGHT, facing_up, to_sapien
+from .drawing import UPRIGHT, to_sapien
 
 sapien = lazy_import("sapien")
 physx = lazy_import("sapien.physx")
@@ -67,7 +67,7 @@ def add_ground(world: Any, scene: Scene, groups: Groups) -> Any:
     builder = world.create_actor_builder()
     friction = scene.ground_friction
     material = physx.PhysxMaterial(friction, friction, scene.ground_restitution)
-    builder.add_plane_collision(facing_up(), material)
+    builder.add_plane_collision(to_sapien(UPRIGHT), material)
     builder.collision_groups = groups.get("ground", [WORLD, WORLD | ROBOT, 0, 0])
     entity = builder.build_static("ground")
     return entity.find_component_by_type(physx.PhysxRigidStaticComponent)

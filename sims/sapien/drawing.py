@@ -28,7 +28,8 @@ NEAR, FAR = 0.1, 100.0
 LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.4, 0.45, 0.5, 1.0)
 
 UPRIGHT = Pose(quaternion=(math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0))
-"""Turns the x axis, along which SAPIEN's cylinders and capsules lie, to the z axis."""
+"""Turns the x axis, along which SAPIEN's cylinders and capsules lie and its planes face, to the z
+axis."""
 
 NO_VULKAN = (
     "SAPIEN draws with Vulkan and finds no device for it ({error}); it takes a graphics card's "
@@ -86,7 +87,7 @@ class Drawing:
     def _add_ground(self) -> None:
         size = np.array([0.0, 10.0, 10.0])
         shape = rendering.RenderShapePlane(size, _material(GROUND_COLOUR))
-        self._add("ground", [shape]).set_pose(facing_up())
+        self._add("ground", [shape]).set_pose(to_sapien(UPRIGHT))
 
     def _solid(self, solid: Solid, colour: tuple[float, ...]) -> Any:
         x, _, z = half = np.array(solid.extents) / 2
@@ -162,11 +163,6 @@ def _triangles(solid: Solid, material: Any) -> Any:
         np.zeros((len(corners), 2), dtype=np.float32),
         material,
     )
-
-
-def facing_up() -> Any:
-    """Pose of the ground: a plane faces along x; turned by -90 degrees about y, it faces up."""
-    return sapien.Pose([0, 0, 0], [math.sqrt(0.5), 0, -math.sqrt(0.5), 0])
 
 
 def _material(colour: tuple[float, ...]) -> Any:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.description.links import subspace
 from pytest_simbench.description.shapes import NO_REACH, Outline, a_box, a_cylinder, a_mesh, a_round
 from pytest_simbench.parity import readback
 from pytest_simbench.parity.readback import one_value
@@ -91,10 +92,9 @@ class ReadBack(readback.ReadBack):
         joint, own, position = self.joints[name]
         stiffness, damping, friction, rest = own_of(joint, own, self.system.timestep)
         frame = _pose(joint.pose_in_child)  # which turns about, or moves along, its x axis
-        axis, still = frame.rotation()[:, 0], np.zeros(3)
-        turning = [axis, np.cross(frame.position, axis)]
+        axis, at = frame.rotation()[:, 0], np.asarray(frame.position)
         return ({} if rest is None else {"rest": rest}) | {
-            "axis": np.concatenate([still, axis] if "prism" in joint.type else turning),
+            "axis": subspace(axis, at, slides="prism" in joint.type),
             "limits": joint.limits[0],
             "effort_limit": joint.force_limit,
             "stiffness": joint.stiffness + stiffness,

@@ -27,24 +27,14 @@ BOX = f"{CUBE}/link/collision"
 Fault = Callable[[ET.Element], None]
 
 
-def scaled(path: str, factor: float, at: int = 0) -> Fault:
-    """One of the numbers at a path, times a factor."""
+def other(path: str, at: int, factor: float = 1.0, by: float = 0.0) -> Fault:
+    """One of the numbers at a path, times a factor, and moved."""
 
-    def plant(world: ET.Element) -> None:
-        for element in world.findall(path):
-            numbers = [float(text) for text in (element.text or "").split()]
-            numbers[at] *= factor
-            element.text = " ".join(map(repr, numbers))
-
-    return plant
-
-
-def moved(path: str, at: int, by: float) -> Fault:
     def plant(world: ET.Element) -> None:
         element = world.find(path)
         assert element is not None
         numbers = [float(text) for text in (element.text or "").split()]
-        numbers[at] += by
+        numbers[at] = factor * numbers[at] + by
         element.text = " ".join(map(repr, numbers))
 
     return plant
@@ -72,9 +62,9 @@ def ghost(path: str) -> Fault:
 
 
 FAULTS: dict[str, Fault] = {
-    "timestep": scaled("physics/max_step_size", 0.5),
-    "ground/height": moved("model[@name='ground']/pose", 2, 0.01),
-    "body/cube_05/com": moved(f"{CUBE}/link/inertial/pose", 0, 0.01),
+    "timestep": other("physics/max_step_size", 0, factor=0.5),
+    "ground/height": other("model[@name='ground']/pose", 2, by=0.01),
+    "body/cube_05/com": other(f"{CUBE}/link/inertial/pose", 0, by=0.01),
     "body/cube_05/gravity": added(f"{CUBE}/link", "gravity", "false"),
     "body/cube_05/touches": ghost(BOX),
     "body/cube_05/dynamic": added(f"{CUBE}/link", "kinematic", "true"),

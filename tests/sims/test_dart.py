@@ -1,5 +1,5 @@
-"""What only DART's adapter has to show: its motors keep the effort limits and squeeze alike on both
-sides though one finger only follows, and what stands on the ground does not sink."""
+"""What only DART's adapter has to show: what its motors are asked for, coupled joints, bodies
+asleep, and that what stands on the ground does not sink."""
 
 from __future__ import annotations
 
@@ -18,35 +18,15 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import known_robot
 from pytest_simbench.scene import Box, Coupling, FloatArray, Pose, Robot, Scene
 from pytest_simbench.simulator import NotSupportedError
-from pytest_simbench.simulator.settings import changed
 from pytest_simbench.testing import scenes
+
+from .worlds import loaded, stepped
 
 pytest.importorskip("dartpy")
 
 
-def world(scene: Scene, profile: str = "tuned", **changes: Any) -> DART:
-    simulator = DART(changed(DART.profiles[profile], changes, "dart"))
-    simulator.load(scene)
-    return simulator
-
-
-def test_motors_keep_the_effort_limits() -> None:
-    """Torn to and fro, too shortly to reach a joint limit, no drive exceeds its own limit and every
-    arm drive reaches it."""
-    robot = scenes.arm()
-    simulator = world(scenes.arm_alone(robot))
-    limits = robot.column("effort_limit")
-    limits[robot.finger_indices[1]] *= 2  # the follower's: it carries both drives' force
-    largest, rest = np.zeros_like(limits), np.zeros_like(limits)
-    for k in range(120):
-        target = robot.column("initial_position")
-        target[:7] += 1.0 if k // 20 % 2 else -1.0
-        simulator.command(target, rest, rest)
-        simulator.step()
-        efforts = simulator._robot.getConstraintForces()[simulator._index]
-        largest = np.maximum(largest, np.abs(efforts))
-    assert (largest <= limits * (1 + 1e-9)).all()
-    np.testing.assert_allclose(largest[:7], limits[:7], rtol=1e-6)
+def world(scene: Scene, **changes: Any) -> DART:
+    return loaded(DART, scene, **changes)
 
 
 def test_the_drives_are_asked_for_speed_and_place() -> None:
@@ -57,32 +37,6 @@ def test_the_drives_are_asked_for_speed_and_place() -> None:
     simulator.step()
     asked = simulator._robot.getCommands()[simulator._index[:7]]
     assert asked == pytest.approx((10 * 0.01 + 0.2) / (1 + 10 * simulator.settings.timestep))
-
-
-def squeeze(simulator: DART) -> tuple[float, float]:
-    """Force of each finger on the held cube along the fingers' axis y [N]."""
-    result = simulator.world.getLastCollisionResult()
-    forces = {"panda_leftfinger": 0.0, "panda_rightfinger": 0.0}
-    for k in range(result.getNumContacts()):
-        contact = result.getContact(k)
-        pair = (contact.collisionObject1, contact.collisionObject2)
-        for name in (item.getShapeFrame().getName() for item in pair):
-            for finger in forces:
-                if name.startswith(finger):
-                    forces[finger] += abs(float(contact.force[1]))
-    return forces["panda_leftfinger"], forces["panda_rightfinger"]
-
-
-def test_both_fingers_press_with_the_squeeze() -> None:
-    scene = scenes.grip()
-    assert scene.robot is not None
-    simulator = world(scene)
-    goal = scene.robot.column("initial_position")
-    goal[scene.robot.finger_indices] = scene.robot.gripper.closed
-    simulator.command(goal, 0 * goal, 0 * goal)
-    for _ in range(round(0.6 / simulator.settings.timestep)):
-        simulator.step()
-    assert squeeze(simulator) == pytest.approx((25.0, 25.0), rel=0.02)
 
 
 def test_restore_of_bodies_asleep_continues_as_if_uninterrupted() -> None:
@@ -180,9 +134,7 @@ def test_a_cube_under_another_stands_on_a_slab(
 def test_the_ground_is_a_slab_where_cubes_would_sink() -> None:
     """A cube beside the SO-101 stays where it was put."""
     cube = small_cube(Pose.at(0.5, 0.0, EDGE / 2))
-    simulator = world(Scene("beside", (cube,), known_robot("so101")), **OWN)
-    for _ in range(1000):
-        simulator.step()
+    simulator = stepped(world(Scene("beside", (cube,), known_robot("so101")), **OWN), 1.0)
     assert simulator.body_state()[0, 2] == pytest.approx(EDGE / 2, abs=1e-4)
 
 
@@ -197,13 +149,8 @@ def test_a_coupled_joint_carries_the_other(heavy: float, driven: bool) -> None:
         for name, y, mass, more in (("a", 0.0, 1.0, drive), ("b", 0.5, heavy, {}))
     ]
     robot = mechanism("pair", *parts, couplings=(Coupling("b", "a"),))
-    simulator, alone = (
-        world(Scene("pair", robot=robot)),
-        world(Scene("one", robot=mechanism("one", parts[0]))),
-    )
-    for _ in range(300):
-        simulator.step()
-        alone.step()
+    simulator = stepped(world(Scene("pair", robot=robot)), 0.3)
+    alone = stepped(world(Scene("one", robot=mechanism("one", parts[0]))), 0.3)
     (first, second), right = simulator.joint_state()[0], alone.joint_state()[0, 0]
     assert second == pytest.approx(first, abs=1e-4)
     assert first == pytest.approx(right, abs=1e-4)

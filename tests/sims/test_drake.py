@@ -20,13 +20,14 @@ from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import joints, scenes
 
+from .worlds import loaded, stepped
+
 SCENE = Stacking().scene(1, Jitter())
 
 
 @pytest.mark.parametrize(("profile", "spheres"), [("default", 0), ("tuned", 8)])
 def test_only_tuned_adds_spheres(profile: str, spheres: int) -> None:
-    simulator = Drake(Drake.profiles[profile])
-    simulator.load(SCENE)
+    simulator = loaded(Drake, SCENE, profile)
     assert len(simulator.world.shapes["cube_05"]) == 1 + spheres
     assert len(simulator.world.shapes["table"]) == 1
     simulator.close()
@@ -34,10 +35,7 @@ def test_only_tuned_adds_spheres(profile: str, spheres: int) -> None:
 
 def test_tuned_cube_rests_on_its_four_lower_corners() -> None:
     cube = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.4, 0.0, 0.025), 0.1)
-    simulator = Drake(Drake.profiles["tuned"])
-    simulator.load(Scene("one", (cube,)))
-    for _ in range(150):
-        simulator.step()
+    simulator = stepped(loaded(Drake, Scene("one", (cube,))), 0.3)
     results = simulator.plant.get_contact_results_output_port().Eval(simulator.context)
     infos = [results.point_pair_contact_info(k) for k in range(simulator.contact_count())]
     places = np.array([info.contact_point() for info in infos])
@@ -52,10 +50,8 @@ def test_tuned_cube_rests_on_its_four_lower_corners() -> None:
 def test_a_joint_with_friction_keeps_its_rotor_inertia() -> None:
     """Its brake is an actuator too, and of several Drake takes the rotor inertia of the last."""
     robot = mechanism("braked", joints.slider("braked", friction=4.0))
-    simulator = Drake(Drake.profiles["tuned"])
-    simulator.load(Scene("braked", robot=scenes.with_joint(robot, "braked", armature=1.0)))
-    for _ in range(100):
-        simulator.step()
+    scene = Scene("braked", robot=scenes.with_joint(robot, "braked", armature=1.0))
+    simulator = stepped(loaded(Drake, scene), 0.2)
     falls = simulator.joint_state()[1, 0] / simulator.time
     simulator.close()
     expected = (joints.MASS * STANDARD_GRAVITY[2] + 4.0) / (joints.MASS + 1.0)

@@ -25,12 +25,11 @@ from pytest_simbench.testing import scenes
 from pytest_simbench.testing.faults import FAULTS, true_scene
 
 from . import (
+    compiled_faults,
     dart_faults,
     drake_faults,
     gazebo_faults,
     genesis_faults,
-    mujoco_faults,
-    newton_faults,
     ode_faults,
     ovphysx_faults,
     pybullet_faults,
@@ -93,8 +92,8 @@ ENGINES = {
         {"gripper/coupled": "dartsim's own to break, see `test_gazebo`"},
     ),
     "genesis": Engine(genesis_faults.FaultyGenesis, STACKING),
-    "mujoco": Engine(mujoco_faults.FaultyMuJoCo),
-    "newton": Engine(newton_faults.FaultyNewton),
+    "mujoco": Engine(compiled_faults.FaultyMuJoCo),
+    "newton": Engine(compiled_faults.FaultyNewton),
     "ode": Engine(ode_faults.FaultyODE, STACKING),
     "ovphysx": Engine(ovphysx_faults.FaultyOvPhysX, MEAN),
     "pybullet": Engine(

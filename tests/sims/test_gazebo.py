@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 from pytest_simbench.sims.gazebo import server
 from pytest_simbench.sims.gazebo.sdf import Physics, robot_model, world_text
+from pytest_simbench.sims.gazebo.settings import GazeboSettings
 from pytest_simbench.sims.gazebo.window import Window
 
 from pytest_simbench.client.errors import EngineFailed, WorkerExited, WorkerHung
@@ -123,7 +124,7 @@ def test_the_world_is_that_of_the_engine(tmp_path: Path) -> None:
     scene = replace(SCENE, bodies=(replace(CUBE, name="robot", pose=Pose.at(1.0, 1.0, 0.025)),))
     prepared = PreparedRobot(SCENE.robot)
     for engine, elements in (("dartsim", "ode/mu"), ("bullet-featherstone", "bullet/friction")):
-        physics = Physics(engine, 0.001, "ode", "dantzig", torsional_friction=0.25)
+        physics = Physics(GazeboSettings(engine=engine, torsional_friction=0.25))
         world = ET.fromstring(world_text(scene, prepared, physics, "w", tmp_path)).find("world")
         assert world is not None
         assert world.findtext("plugin/engine/filename") == f"gz-physics-{engine}-plugin"
@@ -254,7 +255,7 @@ def test_what_is_drawn_is_what_collides(tmp_path: Path) -> None:
     """In the scene's colours, and only where there is a window."""
     assert SCENE.robot is not None
     prepared = PreparedRobot(SCENE.robot)
-    physics = Physics("dartsim", 0.001, "ode", "dantzig")
+    physics = Physics(GazeboSettings())
     plain = ET.fromstring(world_text(SCENE, prepared, physics, "w", tmp_path))
     world = ET.fromstring(world_text(SCENE, prepared, physics, "w", tmp_path, drawn=True)).find(
         "world"

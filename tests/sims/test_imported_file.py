@@ -18,11 +18,10 @@ from pytest_simbench.sims.newton.adapter import Newton  # noqa: E402
 
 from pytest_simbench.client.errors import EngineFailed  # noqa: E402
 from pytest_simbench.scene import Pose, Scene  # noqa: E402
-from pytest_simbench.simulator.settings import changed  # noqa: E402
 
 from .test_mujoco_articulated import KITCHEN  # noqa: E402
 from .test_mujoco_reading import SMALL  # noqa: E402
-from .worlds import Worlds  # noqa: E402
+from .worlds import Worlds, loaded, stepped  # noqa: E402
 
 STEP = 1e-3
 
@@ -45,13 +44,8 @@ def scene_of(path: Path, text: str) -> Scene:
 
 
 def in_mujoco(scene: Scene, steps: int) -> tuple[np.ndarray, np.ndarray]:
-    simulator = MuJoCo(changed(MuJoCo.profiles["file"], {"timestep": STEP}, "mujoco"))
-    simulator.load(scene)
-    for _ in range(steps):
-        simulator.step()
-    found = simulator.body_state(), simulator.joint_state()
-    simulator.close()
-    return found
+    simulator = stepped(loaded(MuJoCo, scene, "file", timestep=STEP), steps * STEP)
+    return simulator.body_state(), simulator.joint_state()
 
 
 @pytest.mark.parametrize("text", [SMALL, KITCHEN], ids=["small", "kitchen"])

@@ -15,6 +15,8 @@ from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import scenes
 from sims.mujoco.bounces import LARGEST, damping_ratio, direct, restitution_of
 
+from .worlds import loaded
+
 
 def left(stiffness: float, damping: float) -> float:
     """Share of its speed with which a mass leaves such a contact: at the end of their force."""
@@ -42,8 +44,7 @@ def test_all_and_nothing() -> None:
 def test_what_brakes_a_spin_is_told() -> None:
     """Euler's law about the vertical: of 0.02 s of a cube that spins on the ground."""
     cube = replace(scenes.cube("cube", Pose.at(0, 0, 0.025)), angular_velocity=(0.0, 0.0, 20.0))
-    simulator = MuJoCo(MuJoCo.profiles["tuned"])
-    simulator.load(Scene("spin", (cube,)))
+    simulator = loaded(MuJoCo, Scene("spin", (cube,)))
     spins, torques = [], []
     for _ in range(20):
         simulator.step()

@@ -19,11 +19,12 @@ from pytest_simbench.description.urdf import PreparedRobot  # noqa: E402
 from pytest_simbench.experiment.case import Case  # noqa: E402
 from pytest_simbench.experiment.handle import SimulatorHandle  # noqa: E402
 from pytest_simbench.experiment.scene_file import read_scene_file  # noqa: E402
-from pytest_simbench.parity.compare import compare  # noqa: E402
-from pytest_simbench.parity.quantities import expected_quantities  # noqa: E402
+from pytest_simbench.scene import Scene  # noqa: E402
 from pytest_simbench.simulator import DescriptionError  # noqa: E402
-from pytest_simbench.simulator.settings import changed as with_changes  # noqa: E402
 from tests.conftest import ADAPTERS, case_of  # noqa: E402
+
+from .test_mujoco_reading import wrong  # noqa: E402
+from .worlds import loaded, stepped  # noqa: E402
 
 KITCHEN = """
 <mujoco model="kitchen">
@@ -93,8 +94,7 @@ def accelerations(reading: Reading, seed: int) -> dict[str, list[float]]:
     """Of all joints, in the file's model and in the scene's, without contacts."""
     assert reading.scene.robot is not None
     names = reading.scene.robot.joint_names
-    simulator = MuJoCo(MuJoCo.profiles["default"])
-    simulator.load(reading.scene)
+    simulator = loaded(MuJoCo, reading.scene, "default")
     rng = np.random.default_rng(seed)
     positions, speeds = rng.uniform(0, 0.2, len(names)), rng.uniform(-1, 1, len(names))
     found = {}
@@ -197,27 +197,16 @@ def test_constraints_move_links_as_in_the_file(
     assert len(reading.scene.robot.couplings) == couplings
     found = {}
     for profile in ("default", "file"):
-        simulator = MuJoCo(with_changes(MuJoCo.profiles[profile], {"timestep": 1e-4}, "mujoco"))
-        simulator.load(reading.scene)
-        for _ in range(1000):
-            simulator.step()
-        found[profile] = simulator.joint_state()
-        simulator.close()
-    free = moved(kitchen)
+        found[profile] = moved(reading.scene, profile).joint_state()
+    kitchen.write_text(KITCHEN)
+    free = moved(Reading(str(kitchen)).scene, "file").joint_state()[0]
     assert np.abs(found["file"][0] - free).max() > 0.01
     assert found["default"][0] == pytest.approx(found["file"][0], rel=0.01, abs=2e-4)
 
 
-def moved(path: Path) -> np.ndarray:
-    """Positions of the joints after a tenth of a second without constraints."""
-    path.write_text(KITCHEN)
-    simulator = MuJoCo(with_changes(MuJoCo.profiles["file"], {"timestep": 1e-4}, "mujoco"))
-    simulator.load(Reading(str(path)).scene)
-    for _ in range(1000):
-        simulator.step()
-    found = simulator.joint_state()[0]
-    simulator.close()
-    return found
+def moved(scene: Scene, profile: str) -> MuJoCo:
+    """The world after a tenth of a second in steps of 0.1 ms."""
+    return stepped(loaded(MuJoCo, scene, profile, timestep=1e-4), 0.1)
 
 
 @pytest.mark.parametrize(
@@ -344,14 +333,8 @@ def test_the_file_itself_moves_as_the_carried_tree(
     """The profile `file` beside `default`, a tenth of a second long."""
     scene, found = read(kitchen).scene, {}
     for profile in ("default", "file"):
-        settings = with_changes(MuJoCo.profiles[profile], {"timestep": 1e-4}, "mujoco")
-        simulator = MuJoCo(settings)
-        simulator.load(scene)
-        declared = [d for d in simulator.info.deviations if d.concerns(scene)]
-        expected = expected_quantities(scene, simulator.settings)
-        assert not compare(expected, simulator.read_back(), declared, "mujoco").wrong
-        for _ in range(1000):
-            simulator.step()
+        assert not wrong(loaded(MuJoCo, scene, profile))
+        simulator = moved(scene, profile)
         found[profile] = simulator.joint_state()
         assert {name for pair in simulator.contact_forces() for name in pair[:2]} <= {
             "body/ball", "link/drawer",

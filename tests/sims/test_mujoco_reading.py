@@ -17,7 +17,8 @@ from pytest_simbench.parity.compare import compare  # noqa: E402
 from pytest_simbench.parity.quantities import expected_quantities  # noqa: E402
 from pytest_simbench.scene import Box, Compound, Pose, Scene, Sphere  # noqa: E402
 from pytest_simbench.simulator import DescriptionError, NotSupportedError  # noqa: E402
-from pytest_simbench.simulator.settings import changed  # noqa: E402
+
+from .worlds import loaded  # noqa: E402
 
 SMALL = """
 <mujoco model="small">
@@ -68,9 +69,7 @@ def test_masses_and_the_accelerations_of_a_step_are_those_of_the_file(
     """In the air under a wrench, where all was carried."""
     reading = read(tmp_path)
     scene = reading.scene
-    settings = changed(MuJoCo.profiles[profile], {"timestep": 0.001}, "mujoco")
-    simulator = MuJoCo(settings)
-    simulator.load(scene)
+    simulator = loaded(MuJoCo, scene, profile, timestep=0.001)
     for body in scene.free_bodies:
         assert body.mass == pytest.approx(float(reading.model.body(body.name).subtreemass[0]))
     rows = np.zeros((len(scene.free_bodies), 6))
@@ -102,9 +101,7 @@ def test_file_and_carried_scene_accelerate_alike_in_contact(tmp_path: Path) -> N
     reading = read(tmp_path, text)
     found, step = {}, 1e-5  # the speed of the centre of mass differs in second order
     for profile in ("default", "file"):
-        settings = changed(MuJoCo.profiles[profile], {"timestep": step}, "mujoco")
-        simulator = MuJoCo(settings)
-        simulator.load(reading.scene)
+        simulator = loaded(MuJoCo, reading.scene, profile, timestep=step)
         before = simulator.body_state()[:, 7:]
         simulator.step()
         found[profile] = (simulator.body_state()[:, 7:] - before) / step
@@ -134,12 +131,17 @@ def test_a_raised_ground_moves_the_scene(tmp_path: Path) -> None:
     check_parity(reading.scene, "file")
 
 
-def check_parity(scene: Scene, profile: str) -> None:
-    simulator = MuJoCo(MuJoCo.profiles[profile])
-    simulator.load(scene)
+def wrong(simulator: MuJoCo) -> dict[str, str]:
+    """By quantity: in what the world is not its scene, and no deviation excuses it."""
+    scene = simulator.scene
     declared = [d for d in simulator.info.deviations if d.concerns(scene)]
     expected = expected_quantities(scene, simulator.settings)
-    assert not compare(expected, simulator.read_back(), declared, "mujoco").wrong
+    return compare(expected, simulator.read_back(), declared, "mujoco").wrong
+
+
+def check_parity(scene: Scene, profile: str) -> None:
+    simulator = loaded(MuJoCo, scene, profile)
+    assert not wrong(simulator)
     poses = [body.pose.as_array() for body in scene.free_bodies]
     state = simulator.body_state()
     assert state[:, :3] == pytest.approx(np.array(poses)[:, :3])
@@ -154,7 +156,7 @@ def test_the_file_starts_where_the_scene_has_its_bodies(tmp_path: Path) -> None:
 @pytest.mark.parametrize("scene", [Scene("none"), Scene("other", file="x.xml")])
 def test_the_profile_file_needs_a_file(scene: Scene) -> None:
     with pytest.raises((NotSupportedError, DescriptionError), match="file|x.xml"):
-        MuJoCo(MuJoCo.profiles["file"]).load(scene)
+        loaded(MuJoCo, scene, "file")
 
 
 REFUSED = {
@@ -251,9 +253,8 @@ def test_parts_whose_gravity_is_compensated_unlike_have_the_mean(tmp_path: Path)
 
 def test_the_file_itself_is_borne_once(tmp_path: Path) -> None:
     text = SMALL.replace('name="box"', 'name="box" gravcomp="1"')
-    simulator = MuJoCo(MuJoCo.profiles["file"])
     scene = read(tmp_path, text).scene
-    simulator.load(scene)
+    simulator = loaded(MuJoCo, scene, "file")
     names = [body.name for body in scene.free_bodies]
     pushed = np.zeros((len(names), 6))
     pushed[names.index("box"), :3] = scene.body("box").wrenches[0].force
@@ -263,10 +264,7 @@ def test_the_file_itself_is_borne_once(tmp_path: Path) -> None:
     states = simulator.body_state()
     assert abs(states[names.index("box"), 9]) < 1e-6
     assert states[names.index("ball"), 9] < -0.4
-    declared = [d for d in simulator.info.deviations if d.concerns(scene)]
-    expected = expected_quantities(scene, simulator.settings)
-    wrong = compare(expected, simulator.read_back(), declared, "mujoco").wrong
-    assert not [name for name in wrong if name.endswith("gravity")]
+    assert not [name for name in wrong(simulator) if name.endswith("gravity")]
     simulator.close()
 
 

@@ -1,66 +1,36 @@
-"""What only PyBullet's adapter has to show: its motors keep the effort limits, which Bullet does
-not report; springs and dampers that it pushes itself; parity faults of links and gears that the
-common tests do not plant."""
+"""What only PyBullet's adapter has to show: what its motors follow, springs and dampers that it
+pushes itself, and parity faults of gears that the common tests do not plant."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from contextlib import closing
 
 import numpy as np
 import pytest
 from pytest_simbench.sims.pybullet.adapter import PyBullet
 
 from pytest_simbench.laws.mechanisms import Part, Y, mechanism
-from pytest_simbench.scene import Box, Coupling, FloatArray, Pose, Robot, Scene
+from pytest_simbench.scene import Box, Coupling, Pose, Robot, Scene
 from pytest_simbench.simulator import NotSupportedError
-from pytest_simbench.tasks import Jitter, Throwing
 from pytest_simbench.testing import scenes
 
-SCENE = Throwing().scene(1, Jitter())
-
-
-@pytest.fixture
-def loaded() -> Iterator[PyBullet]:
-    simulator = PyBullet(PyBullet.profiles["tuned"])
-    simulator.load(SCENE)
-    yield simulator
-    simulator.close()
-
-
-def test_motors_keep_the_effort_limits(loaded: PyBullet) -> None:
-    """Parity excuses the effort limits, so they are measured: no drive exceeds its own, and every
-    arm drive that is torn to and fro reaches it."""
-    import pybullet
-
-    robot = SCENE.robot
-    assert robot is not None
-    limits = robot.column("effort_limit")
-    largest, rest = np.zeros_like(limits), np.zeros_like(limits)
-    for k in range(120):
-        target = robot.column("initial_position")
-        target[:7] += 1.0 if k // 30 % 2 else -1.0
-        loaded.command(target, rest, rest)
-        loaded.step()
-        states = pybullet.getJointStates(
-            loaded._robot, loaded._joints, physicsClientId=loaded.client
-        )
-        largest = np.maximum(largest, [abs(state[3]) for state in states])
-    assert (largest <= limits * (1 + 1e-9)).all()
-    np.testing.assert_allclose(largest[:7], limits[:7], rtol=1e-6)
+from .worlds import loaded, stepped
 
 
 @pytest.mark.parametrize("way", [0.002, 9.0])
-def test_motors_follow_the_drive_law(loaded: PyBullet, way: float) -> None:
+def test_motors_follow_the_drive_law(way: float) -> None:
     """In a step h whose efforts they have the arm's motors get to the velocity at which the drive
     law asks for no effort at its end, also to a set point beyond the joints' limits."""
-    robot, step = SCENE.robot, loaded.settings.timestep
-    assert robot is not None
+    robot = scenes.arm()
+    simulator = loaded(PyBullet, scenes.arm_alone(robot))
+    step = simulator.settings.timestep
     k, d, q = (robot.column(of) for of in ("stiffness", "damping", "initial_position"))
     told, speed = q + way, 0.03 - k / d * way
-    loaded.command(told, speed, 0 * q)
-    loaded.step()
+    simulator.command(told, speed, 0 * q)
+    simulator.step()
     law = (k * (told - q) + d * speed) / (step * k + d)
-    np.testing.assert_allclose(loaded.joint_state()[1, :7], law[:7], atol=1e-5)
+    np.testing.assert_allclose(simulator.joint_state()[1, :7], law[:7], atol=1e-5)
+    simulator.close()
 
 
 def test_default_is_what_the_engine_does_by_itself() -> None:
@@ -77,10 +47,7 @@ def test_default_is_what_the_engine_does_by_itself() -> None:
         for k in range(3)
     ]
     scene = Scene("tumbling", tuple(boxes))
-    simulator = PyBullet(PyBullet.profiles["default"])
-    simulator.load(scene)
-    for _ in range(480):
-        simulator.step()
+    simulator = stepped(loaded(PyBullet, scene, "default"), 2.0)
     ours = simulator.body_state()
     simulator.close()
 
@@ -120,9 +87,7 @@ def test_contacts_turn_with_the_hand() -> None:
     scene = scenes.grip()
     robot = scene.robot
     assert robot is not None
-    simulator = PyBullet(PyBullet.profiles["tuned"])
-    simulator.load(scene)
-    try:
+    with closing(loaded(PyBullet, scene)) as simulator:
         target, rest = robot.column("initial_position"), np.zeros(len(robot.joints))
         wrist = robot.joint_names.index("panda_joint7")
         target[robot.finger_indices] = robot.gripper.closed
@@ -140,8 +105,6 @@ def test_contacts_turn_with_the_hand() -> None:
         assert {point[3] for point in points} == set(fingers)
         along = [abs(np.dot(point[7], line)) / np.linalg.norm(line) for point in points]
         assert min(along) > np.cos(0.5), along
-    finally:
-        simulator.close()
 
 
 LIGHT = Part("light", Y, centre=(0.03, 0.0, 0.0), mass=0.01, inertia=(1e-6,) * 3, on="mount",
@@ -150,20 +113,12 @@ LIGHT = Part("light", Y, centre=(0.03, 0.0, 0.0), mass=0.01, inertia=(1e-6,) * 3
 
 
 def built(robot: Robot, *bodies: Box) -> PyBullet:
-    simulator = PyBullet(PyBullet.profiles["tuned"])
-    simulator.load(Scene(robot.name, bodies, robot))
-    return simulator
-
-
-def stepped(simulator: PyBullet, seconds: float) -> FloatArray:
-    for _ in range(round(240 * seconds)):
-        simulator.step()
-    return simulator.joint_state()
+    return loaded(PyBullet, Scene(robot.name, bodies, robot))
 
 
 def test_a_damper_that_a_step_outruns_does_not_throw_its_joint() -> None:
     """The weight turns the lever at torque / damping."""
-    angle, speed = stepped(built(mechanism("light", LIGHT)), 0.5)[:, 0]
+    angle, speed = stepped(built(mechanism("light", LIGHT)), 0.5).joint_state()[:, 0]
     assert 0.1 < angle < 0.2
     assert speed == pytest.approx(0.01 * 9.80665 * 0.03 * np.cos(angle) / 0.01, rel=0.02)
 
@@ -177,7 +132,7 @@ def test_what_blocks_a_damped_joint_feels_all_of_its_spring() -> None:
         mechanism("press", press, base=Pose.at(0.0, 0.0, 0.6)),
         Box("table", (0.4, 0.4, 0.2), Pose.at(0.0, 0.0, 0.1)),
     )
-    assert stepped(simulator, 1.0)[0] == pytest.approx(-0.35, abs=1e-3)
+    assert stepped(simulator, 1.0).joint_state()[0] == pytest.approx(-0.35, abs=1e-3)
     force = sum(abs(wrench[2]) for *_, wrench in simulator.contact_forces())
     assert force == pytest.approx(0.1 * 9.80665 + 400 * 0.05, rel=0.01)
 
@@ -186,9 +141,9 @@ def test_restored_springs_and_dampers_go_on_as_they_were() -> None:
     simulator = built(mechanism("light", LIGHT))
     stepped(simulator, 0.1)
     saved = simulator.save()
-    straight = stepped(simulator, 0.2)
+    straight = stepped(simulator, 0.2).joint_state()
     simulator.restore(saved)
-    assert np.array_equal(stepped(simulator, 0.2), straight)
+    assert np.array_equal(stepped(simulator, 0.2).joint_state(), straight)
 
 
 def test_gears_are_read_and_joints_with_them_have_no_wrenches() -> None:

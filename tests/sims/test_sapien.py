@@ -1,11 +1,9 @@
 """What only SAPIEN's adapter has to show: its settings reach PhysX, `default` is what PhysX and
-SAPIEN do by themselves, the tendon between the fingers takes nothing of the squeeze, groups keep
-apart what the scene does, and what a restored world keeps."""
+SAPIEN do by themselves, groups keep apart what the scene does, and what a restored world keeps."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,20 +24,14 @@ from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import joints, scenes
 
 from .settings_told import told_sapien
+from .worlds import loaded, stepped
 
 sapien = pytest.importorskip("sapien")
 
-TUNED = SAPIEN.profiles["tuned"]
 
-
-@contextmanager
-def world(scene: Scene, chosen: Any = TUNED) -> Iterator[SAPIEN]:
-    simulator = SAPIEN(chosen)
-    try:
-        simulator.load(scene)
-        yield simulator
-    finally:
-        simulator.close()
+def world(scene: Scene) -> Any:
+    """Until it is left."""
+    return closing(loaded(SAPIEN, scene))
 
 
 def test_default_is_what_the_engine_does_by_itself(tmp_path: Path) -> None:
@@ -65,49 +57,13 @@ def test_default_is_what_the_engine_does_by_itself(tmp_path: Path) -> None:
     assert told_sapien(simulator) == pytest.approx(expected)
 
 
-def forces_on(simulator: SAPIEN, body: Any) -> dict[str, FloatArray]:
-    """Force on `body` from each entity that presses on it [N], of the last step."""
-    forces: dict[str, FloatArray] = {}
-    for contact in simulator._system.get_contacts():
-        first, second = contact.bodies
-        if body not in (first, second):
-            continue
-        other, sign = (second, 1.0) if first is body else (first, -1.0)
-        total = sign * np.sum([point.impulse for point in contact.points], axis=0)
-        if total.any():  # pairs within the contact offset are listed too
-            forces[other.entity.name] = total / simulator.settings.timestep
-    return forces
-
-
-def test_the_tendon_takes_nothing_of_the_squeeze() -> None:
-    """Each finger presses with its effort limit, 25 N, on the held cube.
-
-    In short sub-steps, so that the tendon is seen and not the solver's residual (24.6 N at tuned).
-    """
-    scene = scenes.grip()
-    robot = scene.robot
-    assert robot is not None
-    goal = robot.column("initial_position")
-    goal[robot.finger_indices] = robot.gripper.closed
-    fine = replace(TUNED, timestep=0.001, velocity_iterations=1)
-    with world(replace(scene, gravity=(0.0, 0.0, 0.0)), fine) as simulator:
-        simulator.command(goal, 0 * goal, 0 * goal)
-        for _ in range(round(0.5 / simulator.settings.timestep)):
-            simulator.step()
-        forces = forces_on(simulator, simulator._bodies["held"])
-    assert set(forces) == {"panda_leftfinger", "panda_rightfinger"}
-    for force in forces.values():
-        assert np.linalg.norm(force) == pytest.approx(robot.gripper.squeeze, rel=0.01)
-
-
 @pytest.mark.parametrize("ratio", [-3.0, 2.0, 0.2])
 def test_couplings_hold_at_any_ratio(ratio: float) -> None:
     """With coefficients above 1 they stuck, 0.2 rad apart."""
     pair = Coupling("turned", "falling", ratio, 0.1)
     levers = joints.lever("falling"), joints.lever("turned", (0.0, 0.5, 0.0), start=0.1)
     with world(Scene("coupled", robot=mechanism("coupled", *levers, couplings=(pair,)))) as made:
-        for _ in range(100):
-            made.step()
+        stepped(made, 0.4)
         leads, follows = made.joint_state()[0]
     assert follows == pytest.approx(ratio * leads + 0.1, abs=1e-3)
     assert abs(leads) > 0.2
@@ -117,11 +73,8 @@ def test_joints_of_two_links_are_not_coupled() -> None:
     second = Part("second", Y, (0.3, 0.0, 0.0))
     pair = Coupling("second", "first")
     robot = mechanism("chain", joints.lever("first"), second, couplings=(pair,))
-    with (
-        pytest.raises(NotSupportedError, match="'first' is on 'base', 'second' on 'first link'"),
-        world(Scene("chain", robot=robot)),
-    ):
-        pass
+    with pytest.raises(NotSupportedError, match="'first' is on 'base', 'second' on 'first link'"):
+        loaded(SAPIEN, Scene("chain", robot=robot))
 
 
 PARTS = ("ground", *(f"{kind}/{n}" for kind in ("body", "link") for n in range(4)))
@@ -159,8 +112,7 @@ def future(simulator: SAPIEN, steps: int) -> FloatArray:
 
 def test_a_restored_flight_goes_on_bit_for_bit() -> None:
     with world(scenes.tumbling((0.1, 0.06, 0.03))) as simulator:
-        for _ in range(100):
-            simulator.step()
+        stepped(simulator, 0.4)
         assert simulator.contact_count() == 0
         state = simulator.save()
         straight = future(simulator, 50)
@@ -173,8 +125,7 @@ def test_a_restored_tower_is_built_of_new_contacts() -> None:
     cube stays within 1 mm of where it would have been; that the bits differ is the declared
     failure of `restore_continues`."""
     with world(scenes.tower()) as simulator:
-        for _ in range(250):
-            simulator.step()
+        stepped(simulator, 1.0)
         state = simulator.save()
         straight = future(simulator, 500)
         simulator.restore(state)
@@ -213,11 +164,9 @@ def test_what_was_before_a_restore_leaves_no_trace(
 def test_bodies_are_read_in_one_call_as_each_tells_itself() -> None:
     """With fixed boxes and a robot among them, moving, and after a restore."""
     scene = Stacking(levels=1).scene(3, Jitter())
-    simulator = SAPIEN(SAPIEN.profiles["tuned"])
-    simulator.load(scene)
+    simulator = loaded(SAPIEN, scene)
     saved = simulator.save()
-    for _ in range(20):
-        simulator.step()
+    stepped(simulator, 0.08)
 
     def told() -> list[list[float]]:
         bodies = [simulator._bodies[box.name] for box in scene.free_bodies]

@@ -15,6 +15,7 @@ from pytest_simbench.simulator import UnavailableError
 from pytest_simbench.testing import scenes
 
 from .pixels import HEIGHT, RED, WIDTH, pixel, red
+from .worlds import loaded
 
 pytest.importorskip("sapien")
 
@@ -22,8 +23,7 @@ pytest.importorskip("sapien")
 @contextmanager
 def drawn(scene: Scene) -> Iterator[SAPIEN]:
     """The loaded simulator; skips the test where nothing can be drawn."""
-    simulator = SAPIEN(SAPIEN.profiles["tuned"])
-    simulator.load(scene)
+    simulator = loaded(SAPIEN, scene)
     try:
         simulator.render(WIDTH, HEIGHT)
         yield simulator
