@@ -164,7 +164,7 @@ class TapedWorld(World):
         self._latency = Latency(delay) if delay else None
         self._before = before
 
-    def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion | None:
+    def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion:
         asked = Operation(operation, arguments, self.process.where.phase)
         wanted = self._next(asked)
         if self._before is not None:
@@ -174,12 +174,12 @@ class TapedWorld(World):
             self.perform(part, log_period)
             for part in (self._latency.late(wanted) if self._latency else [wanted])
         ]
-        found = [part for part in parts if part is not None and len(part)]
+        found = [part for part in parts if len(part)]
         if self.period is not None:
             self.motions.append(self._kept(found))
-        return Motion.joined(found) if log_period is not None and found else None
+        return Motion.joined(found) if log_period is not None and found else self._still()
 
-    def perform(self, operation: Operation, log_period: float | None = None) -> Motion | None:
+    def perform(self, operation: Operation, log_period: float | None = None) -> Motion:
         """Carry out one operation without putting it on the tape."""
         period = log_period if log_period is not None else self.period
         return super()._move(operation.kind, period, **operation.arguments)
