@@ -40,9 +40,11 @@ def rest(world: World, seconds: float, phase: str) -> Motion:
         return world.wait(RESTLESS, log_period=LOG_PERIOD)
 
 
-def calm(world: World) -> tuple[Motion, list[Forces]]:
-    """The motion of `RESTLESS`, and the forces of contacts now and then in it; none where the
-    simulator does not tell them of this scene."""
+def calm(world: World, seconds: float, phase: str) -> tuple[Motion, list[Forces]]:
+    """The same, and the forces of contacts now and then in that motion; none where the simulator
+    does not tell them of this scene."""
+    with world.phase(phase):
+        world.wait(max(seconds - RESTLESS, RESTLESS))
     parts: list[Motion] = []
     forces: list[Forces] = []
     began = world.time

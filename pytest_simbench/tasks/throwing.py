@@ -44,6 +44,7 @@ from pytest_simbench.tasks.base import (
     Outcome,
     Randomness,
     Task,
+    aside,
     cube,
     scaled,
 )
@@ -231,14 +232,14 @@ class Throwing(Task):
             nonlocal pushed
             pushed = pushes(settling)
             for name in pyramid:
-                off = _off(before[name], world.pose(name))
+                off = aside(before[name], world.pose(name))
                 yield Slack(name, "moved", abs(off - far))
                 if off > far and name in pushed:
                     yield Slack(name, "moved by the throw", abs(pushed[name]))
 
         with world.phase("settle"):
             settling, wait = settle(world, self.settle, slacks, full=self.full_wait)
-        off = [name for name in pyramid if _off(before[name], world.pose(name)) > far]
+        off = [name for name in pyramid if aside(before[name], world.pose(name)) > far]
         if not wait.bound:
             pushed = pushes(settling)
         hit = [name for name in off if pushed.get(name, 0.0) > 0.0]
@@ -283,11 +284,6 @@ def perfect_throw(
         else synchronised_move(start, goal, model.limits)
     )
     return released(model, timed, duration, release_fraction, scale)
-
-
-def _off(before: Pose, after: Pose) -> float:
-    """As the study counts: in x or in y, whichever is more [m]."""
-    return float(np.abs(np.subtract(after.position, before.position))[:2].max())
 
 
 def _pushes(thrown: Thrown, settling: Motion, scene: Scene, scale: float) -> dict[str, float]:

@@ -14,15 +14,13 @@ from pytest_simbench.tasks import Carrying, Jitter, Slipping
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.carrying import ACCELERATION, FRICTION, Shape
 from tests.conftest import performed
-from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, slip
+from tests.tasks.scripted import Mishap, ScriptedProcess, perform, slip
 
 TASK = Carrying(still=1.0)
 
 
 def carried(*script: Mishap, task: Carrying = TASK) -> tuple[Outcome, ScriptedProcess]:
-    process = ScriptedProcess(script)
-    world = ScriptedWorld(process, task.scene(1, Jitter(0.0, 0.0)))
-    return task.perform(world, 1, lambda done, of: None), process
+    return perform(task, *script, jitter=Jitter(0.0, 0.0))
 
 
 def test_a_perfect_hand_has_no_error() -> None:

@@ -14,11 +14,11 @@ from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import Pose
-from pytest_simbench.tasks import Inserting, Jitter, Oversized
+from pytest_simbench.tasks import Inserting, Oversized
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.inserting import ASIDE, CHAMFER, HIGH, HOLE, LONG, WIDE, Section
 from tests.conftest import performed
-from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, slip
+from tests.tasks.scripted import Mishap, ScriptedProcess, perform, slip
 
 SECTIONS = get_args(Section)
 
@@ -36,10 +36,9 @@ class Process(ScriptedProcess):
 
 
 def inserted(task: Inserting, *script: Mishap, misfit: float = 0.0, seed: int = 1) -> Outcome:
-    process = Process(script)
+    process = Process()
     process.misfit = misfit
-    world = ScriptedWorld(process, task.scene(seed, Jitter()))
-    return task.perform(world, seed, lambda done, of: None)
+    return perform(task, *script, seed=seed, process=process)[0]
 
 
 @pytest.mark.parametrize("section", SECTIONS)

@@ -14,7 +14,7 @@ from pytest_simbench.tasks import Jitter, Opening
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.opening import BAR, DRAWER
 from tests.conftest import case_of, performed
-from tests.tasks.scripted import ScriptedProcess, ScriptedWorld
+from tests.tasks.scripted import ScriptedProcess, perform
 
 TASK = Opening()
 
@@ -57,8 +57,7 @@ class PerfectHand(ScriptedProcess):
 
 
 def opened(task: Opening = TASK, **how: float) -> Outcome:
-    world = ScriptedWorld(PerfectHand(**how), task.scene(1, Jitter(0.0, 0.0)))
-    return task.perform(world, 1, lambda done, of: None)
+    return perform(task, jitter=Jitter(0.0, 0.0), process=PerfectHand(**how))[0]
 
 
 def test_a_perfect_hand_has_no_error() -> None:
