@@ -22,8 +22,12 @@ from pytest_simbench.client import reaper
 from pytest_simbench.client.environments import interpreter, missing
 from pytest_simbench.data import DataMissing, read
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
+from pytest_simbench.tasks import Task
 
 with contextlib.suppress(ImportError):
     # dask imports it. It takes from Python's own finder what lists packages, and adds a finder of
@@ -77,6 +81,13 @@ def case_of(case: Case, name: str) -> Case:
         folder=case.folder,
         stall_timeout=120.0 if info.costly_start else case.stall_timeout,
     )
+
+
+def performed(case: Case, task: Task, number: int = 1) -> Record:
+    """The record of a repetition that goes well."""
+    record, error = Repetition(Experiment(case, task), number).run()
+    assert error is None, record.error
+    return record
 
 
 def measured(name: str) -> Any:

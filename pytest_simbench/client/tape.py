@@ -150,19 +150,19 @@ class TapedWorld(World):
         self._latency = Latency(delay) if delay else None
         self._before = before
 
-    def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion | None:
+    def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion:
         asked = Operation(operation, arguments, self.process.where.phase)
         wanted = self._next(asked)
         if self._before is not None:
             self._before(self, wanted)
         self.tape.append(wanted)
         begun, late = len(self.trace), self._latency.late(wanted) if self._latency else [wanted]
-        found = [motion for part in late if (motion := self.perform(part, log_period))]
+        found = [self.perform(part, log_period) for part in late]
         if self._trace_period is not None:
             self.motions.append(self._kept(begun))
-        return Motion.joined(found) if found else None
+        return Motion.joined(found or [self._still()])
 
-    def perform(self, operation: Operation, log_period: float | None = None) -> Motion | None:
+    def perform(self, operation: Operation, log_period: float | None = None) -> Motion:
         """Carry out one operation without putting it on the tape."""
         return super()._move(operation.kind, log_period, **operation.arguments)
 

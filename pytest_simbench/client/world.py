@@ -174,14 +174,15 @@ class World:
             self._servo = self._kinematics(self.scene)
         return self._servo
 
-    def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
+    def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion:
         """Have the robot follow a trajectory; the motion sampled every `log_period` [s] (0: each
         step, None: no samples)."""
         __tracebackhide__ = True
         return self._move("follow", log_period, **vars(trajectory))
 
-    def wait(self, duration: float, *, log_period: float | None = None) -> Motion | None:
-        """Let `duration` [s] of simulated time pass under the last command.
+    def wait(self, duration: float, *, log_period: float | None = None) -> Motion:
+        """Let `duration` [s] of simulated time pass under the last command; the motion as of
+        `follow`.
 
         Raises:
             SceneError: the duration is no number, not finite, or negative.
@@ -266,7 +267,7 @@ class World:
         """No samples."""
         return Motion(np.empty(0), self.joints[None][:0], self.bodies[None][:0])
 
-    def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion | None:
+    def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion:
         __tracebackhide__ = True
         if log_period is not None:
             check_number(log_period, "the log_period [s] of a motion", 0.0)
@@ -278,13 +279,13 @@ class World:
         for request in requests:
             answer = self.process.request(operation, log_period=period, **request)
             self._leave_out(answer.get("aside", 0.0))
-            motion = Motion(**answer["log"]) if answer["log"] else None
-            if motion is not None and self._trace_period is not None and len(motion):
+            motion = Motion(**answer["log"]) if answer["log"] else self._still()
+            if self._trace_period is not None and len(motion):
                 self.trace.append(self._thinned(motion))  # also where it ends in what cannot be
-            if motion is not None and log_period is not None:
+            if log_period is not None:
                 motions.append(motion)
         self._take(answer)
-        return Motion.joined(motions) if motions else None
+        return Motion.joined(motions or [self._still()])
 
     def _parts(self, duration: float, period: float) -> list[float]:
         """A sampled wait in parts of whole steps and samples [s]."""

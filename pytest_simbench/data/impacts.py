@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.data.measured import DataError, Half, Measured, MeasuredMotion, read_motions
+from pytest_simbench.data.measured import DataError, Measured, MeasuredMotion, read_motions
 from pytest_simbench.records.paths import whole
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray
 
@@ -84,6 +84,11 @@ class Impact(MeasuredMotion):
         """100 times the toss's, and the impact's order in it."""
         return 100 * self.toss + self.order
 
+    @property
+    def held_out(self) -> bool:
+        """As its toss is, by the toss's number."""
+        return self.toss % 2 == 1
+
     def content(self) -> Iterable[bytes | np.ndarray]:
         return str(self.number).encode(), np.concatenate([self.place, self.before, self.after])
 
@@ -101,14 +106,7 @@ class Impact(MeasuredMotion):
 
 
 class Impacts(Measured[Impact]):
-    """Impacts in the order of their numbers."""
-
-    def half(self, which: Half) -> tuple[Impact, ...]:
-        """The impacts of tosses that something was chosen on, which have even numbers, or those of
-        tosses that were held out, or all."""
-        if which == "all":
-            return self.items
-        return tuple(item for item in self.items if item.toss % 2 == (which == "held_out"))
+    """Impacts in the order of their numbers; those of tosses with even numbers are not held out."""
 
 
 def read(folder: Path) -> Impacts | None:
@@ -196,12 +194,9 @@ def corner(angle: float) -> FloatArray:
 def _impacts(arrays: Mapping[str, Any]) -> list[Impact]:
     """
     Raises:
-        ValueError: what is wrong with the arrays.
+        KeyError, ValueError: as `read_motions` has it.
     """
-    try:
-        number, state = arrays["number"], arrays["state"]
-    except KeyError as error:
-        raise ValueError(f"the array {error} is missing") from None
+    number, state = arrays["number"], arrays["state"]
     if number.ndim != 1 or number.dtype.kind not in "iu" or len({*number.tolist()}) < len(number):
         raise ValueError("number must be whole numbers, each once")
     if state.dtype.kind != "f" or state.ndim != 3 or (len(state), state.shape[2]) != (

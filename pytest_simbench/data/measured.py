@@ -40,6 +40,11 @@ class MeasuredMotion(ABC):
     def number(self) -> int:
         """In the source."""
 
+    @property
+    def held_out(self) -> bool:
+        """Whether it is kept from choosing: here each second one."""
+        return self.number % 2 == 1
+
     @abstractmethod
     def content(self) -> Iterable[bytes | np.ndarray]:
         """What makes it what it is, as bytes and numbers."""
@@ -57,6 +62,11 @@ class Measured(Generic[M]):
     """
 
     items: tuple[M, ...] = field(repr=False)
+
+    def half(self, which: Half) -> tuple[M, ...]:
+        """The motions by which something was chosen, or those that were held out, or all."""
+        wanted = {"all": (False, True), "chosen_on": (False,), "held_out": (True,)}[which]
+        return tuple(item for item in self.items if item.held_out in wanted)
 
     @cached_property
     def digest(self) -> str:
@@ -82,7 +92,7 @@ def read_motions(path: Path, what: str, make: Callable[[Mapping[str, Any]], T]) 
     Args:
         path: of the file.
         what: its motions are called, for messages.
-        make: raises `ValueError` for arrays that hold none.
+        make: raises `KeyError` where an array is missing, `ValueError` for others that hold none.
 
     Raises:
         DataError: a file that is broken, cut off, or something else.
@@ -91,5 +101,7 @@ def read_motions(path: Path, what: str, make: Callable[[Mapping[str, Any]], T]) 
         return make(read_arrays(path, LARGEST))
     except FileError as error:
         raise DataError(str(error)) from None
+    except KeyError as error:
+        raise DataError(f"{path} holds no {what}: the array {error} is missing") from None
     except ValueError as error:
         raise DataError(f"{path} holds no {what}: {error}") from None

@@ -78,6 +78,11 @@ class ArmRun(MeasuredMotion):
         """In its experiment."""
         return int(self.name[-4:])
 
+    @property
+    def held_out(self) -> bool:
+        """Each second pair of numbers is: 2 and 3, 6 and 7, and so on."""
+        return self.number // 2 % 2 == 1
+
     def content(self) -> Iterable[bytes | np.ndarray]:
         return f"{self.name} {len(self.time)}".encode(), self.time, self.hand, self.cube
 
@@ -104,12 +109,8 @@ class ArmRuns(Measured[ArmRun]):
     urdf: Path
 
     def of(self, experiment: str, which: Half) -> tuple[ArmRun, ...]:
-        """Runs of an experiment by which something was chosen, or those held out, or all. Each
-        second pair of numbers is held out: 2 and 3, 6 and 7, and so on."""
-        named = [run for run in self.items if run.name.startswith(experiment)]
-        if which == "all":
-            return tuple(named)
-        return tuple(run for run in named if run.number // 2 % 2 == (which == "held_out"))
+        """Runs of an experiment by which something was chosen, or those held out, or all."""
+        return tuple(run for run in self.half(which) if run.name.startswith(experiment))
 
 
 def read(folder: Path) -> ArmRuns | None:
@@ -128,18 +129,13 @@ def read(folder: Path) -> ArmRuns | None:
 def _runs(arrays: Mapping[str, np.ndarray]) -> list[ArmRun]:
     """
     Raises:
-        ValueError: what is wrong with the arrays.
+        KeyError, ValueError: as `read_motions` has it.
     """
-    if "runs" not in arrays:
-        raise ValueError("the array 'runs' is missing")
     found = []
     for name in map(str, arrays["runs"]):
         if not name[-4:].isdecimal():
             raise ValueError(f"the run {name!r:.80} has no number of four digits")
-        try:
-            time, hand, cube = (arrays[f"{name}/{what}"] for what in ("time", "hand", "cube"))
-        except KeyError as error:
-            raise ValueError(f"the array {error} is missing") from None
+        time, hand, cube = (arrays[f"{name}/{what}"] for what in ("time", "hand", "cube"))
         n = len(time) if time.ndim == 1 else 0
         if n < 2 or hand.shape != (n, POSE) or cube.shape != (n, POSE):
             raise ValueError(f"the run {name} has arrays that do not fit each other")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pytest_simbench.data.measured import DataError, Half, Measured, MeasuredMotion, read_motions
+from pytest_simbench.data.measured import DataError, Measured, MeasuredMotion, read_motions
 from pytest_simbench.data.torch_file import read_tensor
 from pytest_simbench.records.paths import whole
 from pytest_simbench.scene import FloatArray, Pose, Vector3
@@ -91,14 +91,7 @@ class Toss(MeasuredMotion):
 
 
 class Tosses(Measured[Toss]):
-    """Tosses in the order of their numbers."""
-
-    def half(self, which: Half) -> tuple[Toss, ...]:
-        """The tosses that settings were chosen on, which have even numbers, or those that were held
-        out, or all."""
-        if which == "all":
-            return self.items
-        return tuple(toss for toss in self.items if toss.index % 2 == (which == "held_out"))
+    """Tosses in the order of their numbers; those with even numbers are not held out."""
 
 
 def read(folder: Path) -> Tosses | None:
@@ -116,12 +109,9 @@ def read(folder: Path) -> Tosses | None:
 def _tosses(arrays: Mapping[str, FloatArray]) -> list[Toss]:
     """
     Raises:
-        ValueError: what is wrong with the arrays.
+        KeyError, ValueError: as `read_motions` has it.
     """
-    try:
-        index, length, state = (arrays[name] for name in ("toss_index", "length", "state"))
-    except KeyError as error:
-        raise ValueError(f"the array {error} is missing") from None
+    index, length, state = (arrays[name] for name in ("toss_index", "length", "state"))
     numbers = [a.ndim == 1 and a.dtype.kind in "iu" and len(a) for a in (index, length)]
     if not all(numbers) or len(index) != len(length):
         raise ValueError("toss_index and length must be as many whole numbers")

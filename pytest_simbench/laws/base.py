@@ -148,6 +148,13 @@ class Watched:
     joints: FloatArray
     bodies: FloatArray
 
+    @classmethod
+    def of(cls, motion: Motion) -> Watched:
+        """A motion of every step, of one at least."""
+        first = float(motion.time[0])
+        dt = float(motion.time[1]) - first if len(motion) > 1 else first
+        return cls(dt, motion.time, motion.joints, motion.bodies)
+
     @property
     def steps(self) -> int:
         return len(self.t)
@@ -182,31 +189,19 @@ class Watched:
 
 
 def watch(world: World, duration: float) -> Watched:
-    """Let `duration` [s] pass in a world that was just loaded, and see every step of it.
-
-    Raises:
-        ValueError: the engine told no step.
-    """
-    return _watched(world.wait(duration, log_period=0.0))
+    """Let `duration` [s] pass in a world that was just loaded, and see every step of it."""
+    return Watched.of(world.wait(duration, log_period=0.0))
 
 
 def follow(world: World, rows: Trajectory) -> Watched:
     """The same while the drives follow set points."""
-    return _watched(world.follow(rows, log_period=0.0))
+    return Watched.of(world.follow(rows, log_period=0.0))
 
 
 def held(position: float, seconds: float, velocity: float = 0.0, effort: float = 0.0) -> Trajectory:
     """One joint told to be at `position` [rad or m] at the end, moving there at `velocity`."""
     ends = np.array([[position - velocity * seconds], [position]])
     return Trajectory(seconds, ends, np.full((2, 1), velocity), np.full((2, 1), effort))
-
-
-def _watched(motion: Motion | None) -> Watched:
-    if motion is None or not len(motion):
-        raise ValueError("a motion was asked for step by step, and none came back")
-    first = float(motion.time[0])
-    dt = float(motion.time[1]) - first if len(motion) > 1 else first
-    return Watched(dt, motion.time, motion.joints, motion.bodies)
 
 
 def solved(

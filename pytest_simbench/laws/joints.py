@@ -40,19 +40,25 @@ class Passive(Law, name="", phenomenon="joints"):
         return found
 
     def exact(self, seconds: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Joint positions, velocities and accelerations of the equations of motion M(q) q'' +
-        h(q, q') = 0, by Pinocchio's articulated-body algorithm and DOP853 with a relative
-        tolerance of 1e-10, (n, n_joints) each."""
-        model, start = self.model, self.mechanism.column("initial_position")
-        data, n = model.createData(), len(start)
+        """What `passive_motion` says of it."""
+        return passive_motion(self.model, self.mechanism.column("initial_position"), seconds)
 
-        def change(_: float, state: FloatArray) -> FloatArray:
-            q, v = state[:n], state[n:]
-            return np.concatenate([v, pin.aba(model, data, q, v, np.zeros(n))])
 
-        found = solved(change, [*start, *np.zeros(n)], seconds, 200)
-        bent = np.array([change(0.0, state)[n:] for state in found])
-        return found[:, :n], found[:, n:], bent
+def passive_motion(
+    model: Any, start: FloatArray, seconds: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Joint positions, velocities and accelerations of the equations of motion M(q) q'' + h(q, q')
+    = 0 of a model of Pinocchio's, by its articulated-body algorithm and DOP853 with a relative
+    tolerance of 1e-10, (n, n_joints) each."""
+    data, n = model.createData(), len(start)
+
+    def change(_: float, state: FloatArray) -> FloatArray:
+        q, v = state[:n], state[n:]
+        return np.concatenate([v, pin.aba(model, data, q, v, np.zeros(n))])
+
+    found = solved(change, [*start, *np.zeros(n)], seconds, 200)
+    bent = np.array([change(0.0, state)[n:] for state in found])
+    return found[:, :n], found[:, n:], bent
 
 
 class JointMotion(

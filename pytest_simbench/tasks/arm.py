@@ -158,7 +158,7 @@ class Arm:
         tool_speed: float,
         ignored: tuple[str, ...] = (),
         log_period: float | None = None,
-    ) -> Motion | None:
+    ) -> Motion:
         """Motion of the tool centre point through poses in the world, without a stop.
 
         Args:
@@ -176,7 +176,7 @@ class Arm:
             )
         return self.follow(trajectory, log_period=log_period)
 
-    def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
+    def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion:
         """Follow a trajectory of one's own; it must begin at the commanded set points.
 
         Args:

@@ -199,6 +199,11 @@ def distance(a: Pose, b: Pose) -> float:
     return float(np.linalg.norm(np.subtract(a.position, b.position)))
 
 
+def aside(a: Pose, b: Pose) -> float:
+    """How far one is from the other as the study counts: in x or in y, whichever is more [m]."""
+    return float(np.abs(np.subtract(b.position, a.position))[:2].max())
+
+
 class Randomness(NamedTuple):
     """Independent random generators of a repetition, one for each thing that chance decides: the
     disturbance of the start, the order of the cubes, whatever the planner draws."""

@@ -140,19 +140,17 @@ class Carrying(Task):
         """As it lies at its place, moved by a disturbance."""
         lying, half = Pose(quaternion=(math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)), 0.025
         at = Pose.at(*PLACE, half) * disturbed
-        more = {"mass": self.mass, "friction": FRICTION, "colour": PURPLE}
-        if self.shape == "cube":
-            return Box("thing", (2 * half,) * 3, at, **more)  # type: ignore[arg-type]
-        if self.shape == "ball":
-            return Sphere("thing", half, at, **more)  # type: ignore[arg-type]
-        if self.shape == "tube":
-            return Cylinder("thing", half, 0.08, at * lying, **more)  # type: ignore[arg-type]
-        if self.shape == "pill":
-            return Capsule("thing", half, 0.05, at * lying, **more)  # type: ignore[arg-type]
         corner = half / math.cos(math.pi / 6)
         ring = [(corner * math.cos(k), corner * math.sin(k)) for k in np.arange(6) * math.pi / 3]
         corners, frame = principal([(x, y, z) for z in (-half, half) for x, y in ring])
-        return ConvexMesh("thing", corners, at * frame, **more)  # type: ignore[arg-type]
+        shapes: dict[Shape, Body] = {
+            "cube": Box("thing", (2 * half,) * 3, at),
+            "ball": Sphere("thing", half, at),
+            "tube": Cylinder("thing", half, 0.08, at * lying),
+            "pill": Capsule("thing", half, 0.05, at * lying),
+            "prism": ConvexMesh("thing", corners, at * frame),
+        }
+        return shapes[self.shape].changed(mass=self.mass, friction=FRICTION, colour=PURPLE)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         disturbed = jitter.disturbed(Pose(), Randomness.of(seed).start)
@@ -174,9 +172,7 @@ class Carrying(Task):
                 hand.follow(self.shaking(hand))
             looks.append(_in_hand(world, hand.model))
             began = world.time
-            with world.phase("hold"):
-                world.wait(max(self.still - RESTLESS, RESTLESS))
-            seen, forces = calm(world)
+            seen, forces = calm(world, self.still, "hold")
             looks.append(_in_hand(world, hand.model))
             hand.check_held()
         except (PlanningError, LostBody) as error:

@@ -69,7 +69,6 @@ class Fitting(OnScene):
                 rest = world.wait(log.trajectory.duration, log_period=PERIOD)
             else:
                 rest = world.follow(log.trajectory, log_period=PERIOD)
-        assert rest is not None  # a log was asked for
         found = self.residuals(Motion.joined([first, rest]), began)
         metrics: dict[str, float | None] = {}
         for name, unit, factor in (("off", "mm", 1000.0), ("turned", "deg", 180 / np.pi)):

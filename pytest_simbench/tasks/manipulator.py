@@ -9,7 +9,7 @@ import numpy as np
 
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.motion.collision import PlanningScene
-from pytest_simbench.motion.errors import PlanningError, Unreachable
+from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.grasping import (
     CLEARANCE,
     GRASP_LINK,
@@ -19,7 +19,7 @@ from pytest_simbench.motion.grasping import (
     grasp_of,
 )
 from pytest_simbench.motion.grips import grips, turns
-from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over, top_down_grasps
+from pytest_simbench.motion.kinematics import top_down_grasps
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.throw import Throw
 from pytest_simbench.scene import Body, Box, FloatArray, Pose, Robot, Scene
@@ -110,9 +110,7 @@ class Manipulator(Arm):
         self.check_held()
         self.move_straight(down, speed=self.speeds.contact)
 
-    def throw(
-        self, goal: FloatArray, fraction: float, *, feasible: bool
-    ) -> tuple[Motion | None, Throw]:
+    def throw(self, goal: FloatArray, fraction: float, *, feasible: bool) -> tuple[Motion, Throw]:
         """Swing to arm joints `goal`, the fingers open at `fraction` of the swing's duration.
 
         Args:
@@ -223,29 +221,17 @@ def cannot_handle(
             f"robot {robot.name!r} opens its jaw to {robot.gripper.opened:g} rad, too little for a "
             f"cube of {size:g} m"
         )
-    approach, beside = APPROACH * scale, grasp_of(robot, size, scale).beside
+    aside = Pose.at(0.0, -grasp_of(robot, size, scale).beside, 0.0)
     planning = PlanningScene(model, Scene("reach", tuple(fixed), robot), scale)
     home, rng = robot.column("initial_position")[: model.arm], np.random.default_rng(0)
     for place in places:
-        reason = ""
-        for turned in top_down_grasps(place):
-            tool = tool_over(place, turned.yaw)
-            if beside:
-                tool = tool * Pose.at(0.0, -beside, 0.0)
-            try:
-                above = inverse_kinematics(model, tool.translated(z=approach), home, rng)
-                at = inverse_kinematics(model, tool, above)
-            except Unreachable:
-                reason = reason or "is out of its reach"
-                continue
-            touching = planning.collision(at, margin=False) or planning.collision(above)
-            if touching is None:
-                break
-            reason = f"makes {' touch '.join(touching)}"
-        else:
+        tools = [tool * aside for tool in top_down_grasps(place)]
+        try:
+            choose(planning, tools, APPROACH * scale, home, home, rng)
+        except PlanningError as error:
             x, y, z = place.position
             return (
-                f"robot {robot.name!r} cannot handle a cube at ({x:.2f}, {y:.2f}, {z:.2f}): it "
-                f"{reason}; place its base elsewhere"
+                f"robot {robot.name!r} cannot handle a cube at ({x:.2f}, {y:.2f}, {z:.2f}): "
+                f"{error}; place its base elsewhere"
             )
     return None

@@ -37,23 +37,21 @@ def rest(world: World, seconds: float, phase: str) -> Motion:
     with world.phase(phase):
         world.wait(max(seconds - RESTLESS, RESTLESS))
     with world.phase("rest"):
-        seen = world.wait(RESTLESS, log_period=LOG_PERIOD)
-    assert seen is not None  # a log was asked for
-    return seen
+        return world.wait(RESTLESS, log_period=LOG_PERIOD)
 
 
-def calm(world: World) -> tuple[Motion, list[Forces]]:
-    """The motion of `RESTLESS`, and the forces of contacts now and then in it; none where the
-    simulator does not tell them of this scene."""
+def calm(world: World, seconds: float, phase: str) -> tuple[Motion, list[Forces]]:
+    """The same, and the forces of contacts now and then in that motion; none where the simulator
+    does not tell them of this scene."""
+    with world.phase(phase):
+        world.wait(max(seconds - RESTLESS, RESTLESS))
     parts: list[Motion] = []
     forces: list[Forces] = []
     began = world.time
     with world.phase("rest"):
         for k in range(1, LOOKS + 1):
             until = began + k * RESTLESS / LOOKS
-            part = world.wait(until - world.time, log_period=LOG_PERIOD)
-            assert part is not None  # a log was asked for
-            parts.append(part)
+            parts.append(world.wait(until - world.time, log_period=LOG_PERIOD))
             if k == 1 or forces:
                 forces += [found] if (found := told_forces(world)) is not None else []
     return Motion.joined(parts), forces

@@ -128,9 +128,7 @@ class Settling(OnScene):
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         scene = world.scene
-        with world.phase("settle"):
-            world.wait(max(self.seconds - RESTLESS, RESTLESS))
-        rest, forces = calm(world)
+        rest, forces = calm(world, self.seconds, "settle")
         prepared = None if scene.robot is None else PreparedRobot(scene.robot)
         before = started(scene) | _links(prepared, None)
         bodies = places(world)

@@ -30,6 +30,7 @@ from pytest_simbench.tasks.base import (
     Outcome,
     Randomness,
     Task,
+    aside,
     cube,
     distance,
     scaled,
@@ -249,7 +250,7 @@ class Stacking(Task):
         for name, pose in now.items():
             if name in picks.stacked:
                 place, _ = picks.stacked[name]
-                loose = STUDY_TOLERANCE * self.scale - _aside(place, pose)
+                loose = STUDY_TOLERANCE * self.scale - aside(place.pose, pose)
                 yield Slack(name, "at_end", abs(loose))
                 yield Slack(name, "at_end_strict", abs(_strictly(place, pose, self.scale)))
             if name not in picks.handled:
@@ -291,29 +292,18 @@ class Stacking(Task):
     def _score(self, start: Mapping[str, Pose], end: Mapping[str, Pose], picks: _Picks) -> Outcome:
         stacked, n = picks.stacked, self.cubes
         ends = {name: (place, end[name]) for name, (place, _) in stacked.items()}
-        complete = [
-            sum(
-                _strict(place, pose, self.scale)
-                for place, pose in ends.values()
-                if place.tower == tower
-            )
-            == self.levels
-            for tower in range(self.towers)
-        ]
-        untouched = {
-            name: distance(pose, start[name])
-            for name, pose in end.items()
-            if name not in picks.handled
-        }
+        standing = [item[0].tower for item in ends.values() if _strict(*item, self.scale)]
+        complete = sum(standing.count(tower) == self.levels for tower in range(self.towers))
+        untouched = {name: distance(end[name], start[name]) for name in end.keys() - picks.handled}
         least = UNTOUCHED_DISTANCE * self.scale
-        moved = {name: d for name, d in untouched.items() if d > least}
+        moved = {name: untouched[name] for name in end if untouched.get(name, 0.0) > least}
         return Outcome(
             {
                 "placed": sum(_placed(*item, self.scale) for item in stacked.values()) / n,
                 "at_end": sum(_placed(*item, self.scale) for item in ends.values()) / n,
                 "placed_strict": sum(_strict(*item, self.scale) for item in stacked.values()) / n,
-                "at_end_strict": sum(_strict(*item, self.scale) for item in ends.values()) / n,
-                "towers": sum(complete) / self.towers,
+                "at_end_strict": len(standing) / n,
+                "towers": complete / self.towers,
                 "untouched_moved": float(len(moved)),
                 "failed_picks": float(len(picks.failed)),
             },
@@ -357,12 +347,7 @@ class _Picks:
 
 def _placed(place: Place, pose: Pose, scale: float = 1.0) -> bool:
     """Within the study's distance, scaled, and as it measures: height and order do not matter."""
-    return _aside(place, pose) <= STUDY_TOLERANCE * scale
-
-
-def _aside(place: Place, pose: Pose) -> float:
-    """In x or in y, whichever is more [m]."""
-    return float(np.abs(np.subtract(pose.position, place.pose.position))[:2].max())
+    return aside(place.pose, pose) <= STUDY_TOLERANCE * scale
 
 
 def _strict(place: Place, pose: Pose, scale: float = 1.0) -> bool:

@@ -44,6 +44,7 @@ from pytest_simbench.tasks.base import (
     Outcome,
     Randomness,
     Task,
+    aside,
     cube,
     scaled,
 )
@@ -224,21 +225,21 @@ class Throwing(Task):
         pyramid = [name for name in before if name != "projectile"]
         pushed: dict[str, float] = {}
 
-        def pushes(settling: Motion | None) -> dict[str, float]:
+        def pushes(settling: Motion) -> dict[str, float]:
             return {} if thrown is None else _pushes(thrown, settling, world.scene, self.scale)
 
         def slacks(settling: Motion) -> Iterator[Slack]:
             nonlocal pushed
             pushed = pushes(settling)
             for name in pyramid:
-                off = _off(before[name], world.pose(name))
+                off = aside(before[name], world.pose(name))
                 yield Slack(name, "moved", abs(off - far))
                 if off > far and name in pushed:
                     yield Slack(name, "moved by the throw", abs(pushed[name]))
 
         with world.phase("settle"):
             settling, wait = settle(world, self.settle, slacks, full=self.full_wait)
-        off = [name for name in pyramid if _off(before[name], world.pose(name)) > far]
+        off = [name for name in pyramid if aside(before[name], world.pose(name)) > far]
         if not wait.bound:
             pushed = pushes(settling)
         hit = [name for name in off if pushed.get(name, 0.0) > 0.0]
@@ -258,8 +259,7 @@ class Throwing(Task):
         swing, perfect = manipulator.throw(
             swing_of(self.arm)[1], self.release_fraction, feasible=self.feasible
         )
-        parts = (swing, world.wait(AFTER_THROW, log_period=0.0))
-        motion = Motion.joined([part for part in parts if part is not None])
+        motion = Motion.joined([swing, world.wait(AFTER_THROW, log_period=0.0)])
         thrown = Thrown(
             manipulator.model, motion, world.scene, "projectile", started, perfect, self.scale
         )
@@ -286,18 +286,11 @@ def perfect_throw(
     return released(model, timed, duration, release_fraction, scale)
 
 
-def _off(before: Pose, after: Pose) -> float:
-    """As the study counts: in x or in y, whichever is more [m]."""
-    return float(np.abs(np.subtract(after.position, before.position))[:2].max())
-
-
-def _pushes(
-    thrown: Thrown, settling: Motion | None, scene: Scene, scale: float
-) -> dict[str, float]:
+def _pushes(thrown: Thrown, settling: Motion, scene: Scene, scale: float) -> dict[str, float]:
     """Of each body whose motion the thrown cube began (see `impact`): how much farther the throw
     carried it than it crept on since [m]; infinite where the throw took it out of its place. Above
     0 the throw moved it; what creeps a little farther is its doing."""
-    log = Motion.joined([thrown.motion] if settling is None else [thrown.motion, settling])
+    log = Motion.joined([thrown.motion, settling])
     names = [body.name for body in scene.free_bodies]
     own = names.index("projectile")
     others = [index for index in range(len(names)) if index != own]

@@ -50,7 +50,7 @@ class Slack:
 
 def settle(
     world: World, seconds: float, slacks: Callable[[Motion], Iterable[Slack]], *, full: bool
-) -> tuple[Motion | None, Wait]:
+) -> tuple[Motion, Wait]:
     """Wait `seconds` [s] of simulated time, or shorter where nothing can change any more. The costs
     of stepping are those of the work before.
 
@@ -59,19 +59,18 @@ def settle(
         full: wait all of it in any case.
 
     Returns:
-        The motion, None if it was too short for a sample; and how it ended.
+        The motion, without a sample if it was too short for one; and how it ended.
     """
     world.worked = world.stats()["stepping"]
     began, parts = world.time, []
     ends = [] if full else np.arange(WINDOW, seconds - WINDOW / 2, WINDOW).tolist()
     for end in [*ends, seconds]:
-        part = world.wait(max(0.0, began + end - world.time), log_period=SAMPLING)
-        parts += [] if part is None else [part]
+        parts.append(world.wait(max(0.0, began + end - world.time), log_period=SAMPLING))
         if len(parts) > 1 and end < seconds:
             bound = _bound(world.scene, parts, seconds - end, slacks)
             if bound is not None:
                 return Motion.joined(parts), Wait(world.time - began, seconds, *bound)
-    return Motion.joined(parts) if parts else None, Wait(world.time - began, seconds)
+    return Motion.joined(parts), Wait(world.time - began, seconds)
 
 
 def _bound(

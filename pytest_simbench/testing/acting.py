@@ -11,6 +11,7 @@ import pytest
 
 from pytest_simbench.laws.free import AxialForce, AxialTorque
 from pytest_simbench.laws.sliding import BeltSpeed
+from pytest_simbench.laws.sticking import slab_on
 from pytest_simbench.scene import Box, Compound, Pose, Scene, Wrench
 from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.scene.pose import vector3
@@ -109,7 +110,7 @@ def weight_is_told(subject: Subject) -> None:
 def friction_is_told(subject: Subject) -> None:
     """On a slope of 0.2 the ground holds a slab at rest against all of its weight, friction and
     normal force together, within 2 %."""
-    _told(subject, scenes.incline(0.2, 0.5), {("body/slab", "ground"): MASS})
+    _told(subject, slab_on("incline", 0.2, 0.0, 0.5), {("body/slab", "ground"): 1.0})
 
 
 MOMENTS = (1.0e-3, 1.2e-3, 1.1e-3)

@@ -22,7 +22,7 @@ from pytest_simbench.simulator import Capability, Settings
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import any_robot, check
-from pytest_simbench.testing.subject import Subject, logged, require, require_close
+from pytest_simbench.testing.subject import Subject, require, require_close
 
 SINGLE = 1e-5
 """Engines in single precision keep about 7 digits; after some arithmetic 5 are safe."""
@@ -123,7 +123,7 @@ def time_advances(subject: Subject) -> None:
     for step in (subject.timestep, subject.timestep / 2):
         with subject.world(scenes.falling(), changes={"timestep": step}) as world:
             require_close("time after loading", world.time, 0.0, 0.0, "s")
-            motion = logged(world.wait(100 * step, log_period=0))
+            motion = world.wait(100 * step, log_period=0)
             require(len(motion) == 100, f"100 steps gave {len(motion)} samples")
             wrong = np.abs(motion.time - step * np.arange(1, 101)).max()
             require_close("largest error of time", wrong, 0.0, 1e-6 * 100 * step, "s")

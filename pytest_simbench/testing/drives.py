@@ -9,7 +9,7 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import any_robot, check, coupled, grasping
-from pytest_simbench.testing.subject import Subject, logged, require, require_close
+from pytest_simbench.testing.subject import Subject, require, require_close
 
 ARM_TICK = 0.004
 """Control tick of the set points [s], as in the tasks."""
@@ -59,7 +59,7 @@ def tracks_trajectory(subject: Subject) -> None:
     with subject.world(scenes.arm_alone(robot)) as world:
         world.follow(hold)
         world.wait(1.0)  # so that the load's own transient is over
-        motion = logged(world.follow(Trajectory(ARM_TICK, q, v, effort), log_period=0))
+        motion = world.follow(Trajectory(ARM_TICK, q, v, effort), log_period=0)
     late = motion.time - motion.time[0] + subject.timestep
     ideal = np.stack([np.interp(late, time, column) for column in q.T], axis=1)
     error = np.abs(motion.joints[:, 0, :arm] - ideal[:, :arm]).max(axis=0)
@@ -134,7 +134,7 @@ def saturated_drive_settles(subject: Subject) -> None:
     way = float(np.sign(_far(robot))) * min(1.0, first.effort_limit / inertia * late**2 / 2)
     with subject.world(scenes.arm_alone(robot, (0.0, 0.0, 0.0), "arm weightless")) as world:
         world.follow(Trajectory.holding(subject.timestep, start + way * np.eye(len(start))[0]))
-        motion = logged(world.wait(10 * late, log_period=0))
+        motion = world.wait(10 * late, log_period=0)
     left = 1 - (motion.joints[:, 0, 0] - start[0]) / way
     require_close("share of the way that joint 1 goes too far", max(0.0, -left.min()), 0, 0.05, "")
     require_close("share of the way that is left to joint 1", float(left[-1]), 0.0, 0.05, "")

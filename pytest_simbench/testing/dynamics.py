@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from pytest_simbench.laws.hands import gravity_effort, hold_command
+from pytest_simbench.laws.joints import passive_motion
 from pytest_simbench.laws.loops import FourBarClosure, FourBarSwing
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory, Vector3
@@ -70,13 +71,8 @@ def _fall(robot: Robot, armature: bool) -> tuple[FloatArray, FloatArray]:
     n = model.nv
     model.armature = robot.column("armature")[:n] if armature else np.zeros(n)
     model.gravity.linear = robot.base.rotation().T @ np.array(STANDARD_GRAVITY)
-    data, q, v, path = model.createData(), q[:n].copy(), np.zeros(n), []
-    dt = 1e-4
-    for _ in range(round(_FALL / dt)):
-        v = v + dt * pin.aba(model, data, q, v, np.zeros(n))
-        q = q + dt * v
-        path.append(q)
-    return np.array(path), v
+    path, speeds, _ = passive_motion(model, q[:n], _FALL)
+    return path, speeds[-1]
 
 
 @check(robot=any_robot)

@@ -18,7 +18,7 @@ from pytest_simbench.tasks.throw_analysis import Thrown
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import any_robot, check, grasping, throwing
 from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS, Approach, approaches, beside
-from pytest_simbench.testing.subject import Subject, asked, logged, require, require_close
+from pytest_simbench.testing.subject import Subject, asked, require, require_close
 
 _GRASP = 0.5
 """For how long the hand closes before anything is asked [s]."""
@@ -128,7 +128,7 @@ def links_are_felt(subject: Subject) -> None:
         scene = Scene(f"fly {group[0].link}", cubes, robot=robot, gravity=(x, y, z))
         with subject.world(scene) as world:
             world.follow(hold_command(scene, subject.timestep))
-            motion = logged(world.wait(0.04 - world.time, log_period=0.002))
+            motion = world.wait(0.04 - world.time, log_period=0.002)
         for k, approach in enumerate(group):
             _require_touch(subject, approach, motion.bodies[:, k, :3])
 
@@ -206,7 +206,7 @@ def released_cube_is_let_be(subject: Subject) -> None:
         world.wait(_GRASP)
         start = world.bodies[0].copy()
         parts = (world.follow(opened, log_period=0.0), world.wait(0.5, log_period=0.0))
-    rows = np.vstack([start, *(logged(part).bodies[:, 0] for part in parts)])
+    rows = np.vstack([start, *(part.bodies[:, 0] for part in parts)])
     ways = np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1)
     limit = 1.0 * subject.timestep + 5e-4
     require_close("longest way of a released cube in a step", ways.max(), 0.0, limit, "m")
@@ -237,7 +237,7 @@ def thrown_cube_flies_free(subject: Subject) -> None:
         world.wait(_GRASP)
         hand, began = Manipulator(world, np.random.default_rng(0)), world.time
         swing, perfect = hand.throw(goal, 0.5, feasible=True)
-        motion = Motion.joined([logged(swing), logged(world.wait(0.6, log_period=0.0))])
+        motion = Motion.joined([swing, world.wait(0.6, log_period=0.0)])
     flight = Thrown(RobotModel(robot), motion, scene, "held", began, perfect).flight
     require(flight is not None, "the cube did not leave the hand that threw it")
     assert flight is not None

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pytest_simbench.laws.base import solved
 from pytest_simbench.laws.mechanisms import STRONG, Part, Y, mechanism
 from pytest_simbench.scene import (
     Box,
@@ -26,7 +27,7 @@ from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import check
 from pytest_simbench.testing.scenes import GRAVITY as G
-from pytest_simbench.testing.subject import Subject, logged, require, require_close
+from pytest_simbench.testing.subject import Subject, require, require_close
 
 MASS = 1.0
 """Of what moves on a joint here [kg]."""
@@ -58,18 +59,10 @@ def lever(name: str, offset: Vector3 = (0.0, 0.0, 0.0), **values: Any) -> Part:
 
 
 def followed(law: Acceleration, time: FloatArray) -> FloatArray:
-    """Positions from rest at 0, by the fourth-order method of Runge and Kutta in steps of 20 us."""
-    count = int(np.ceil(float(time[-1]) / 2e-5)) + 1
-    h = float(time[-1]) / (count - 1)
-    q, v, found = 0.0, 0.0, [0.0]
-    for _ in range(count - 1):
-        a1 = law(q, v)
-        a2 = law(q + h / 2 * v, v + h / 2 * a1)
-        a3 = law(q + h / 2 * v + h * h / 4 * a1, v + h / 2 * a2)
-        a4 = law(q + h * v + h * h / 2 * a2, v + h * a3)
-        q, v = q + h * v + h * h / 6 * (a1 + a2 + a3), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-        found.append(q)
-    return np.interp(time, h * np.arange(count), found)
+    """Positions from rest at 0, (n,), by DOP853."""
+    grid = np.linspace(0.0, time[-1], 2000)
+    found = solved(lambda _, state: [state[1], law(*state)], [0.0, 0.0], grid[-1], len(grid))
+    return np.interp(time, grid, found[:, 0])
 
 
 def declared(subject: Subject, word: str) -> None:
@@ -88,7 +81,7 @@ def moves(
         if effort is not None:
             rest = np.zeros(len(robot.joints))
             world.follow(Trajectory.holding(subject.timestep, rest, rest + effort))
-        motion = logged(world.wait(SECONDS, log_period=0.01))
+        motion = world.wait(SECONDS, log_period=0.01)
     return motion.time, motion.joints[:, 0]
 
 

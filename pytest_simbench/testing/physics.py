@@ -37,7 +37,7 @@ from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import check
 from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS, of_scene
-from pytest_simbench.testing.subject import Subject, asked, logged, require, require_close
+from pytest_simbench.testing.subject import Subject, asked, require, require_close
 
 RADIUS = 0.03
 """Of round bodies [m]."""
@@ -92,7 +92,7 @@ def slides_alike_diagonally(subject: Subject) -> None:
 @check()
 def slides_flat(subject: Subject) -> None:
     """A sliding slab, 2 cm high and five times as wide, stays on the slope within 1 mm."""
-    motion = subject.motion(scenes.incline(0.75, 0.5), 0.8, 0.01)
+    motion = subject.motion(SlideX().build(), 0.8, 0.01)
     height = motion.bodies[motion.time > 0.1, 0, 2]
     highest = float(height[np.argmax(abs(height - 0.01))])
     require_close("height of the slab's centre while it slides", highest, 0.01, 1e-3, "m")
@@ -305,4 +305,4 @@ def _swings(subject: Subject, collide: bool) -> FloatArray:
         shape=(0.6, 0.04, 0.04),
     )
     with subject.world(Scene(name, robot=robot)) as world:
-        return np.asarray(logged(world.wait(0.8, log_period=0.01)).joints[:, 0])
+        return np.asarray(world.wait(0.8, log_period=0.01).joints[:, 0])

@@ -59,14 +59,6 @@ def tower() -> Scene:
     )
 
 
-def incline(slope: float, mu: float) -> Scene:
-    """A slab on the plane, gravity tilted by atan(slope) along x."""
-    angle = math.atan(slope)
-    gravity = (GRAVITY * math.sin(angle), 0.0, -GRAVITY * math.cos(angle))
-    slab = Box("slab", (0.1, 0.1, 0.02), Pose.at(0, 0, 0.01), MASS, mu)
-    return Scene(f"incline {slope} {mu}", (slab,), gravity=gravity, ground_friction=mu)
-
-
 def tumbling(size: Vector3) -> Scene:
     """A box that falls upon the edge of a fixed one high above the ground, and spins on freely."""
     turn = Pose(quaternion=(math.cos(0.2), math.sin(0.2) * 0.6, math.sin(0.2) * 0.8, 0.0))

@@ -14,7 +14,7 @@ from pytest_simbench.scene import Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import any_robot, check, grasping
-from pytest_simbench.testing.subject import Subject, logged, require
+from pytest_simbench.testing.subject import Subject, require
 
 
 def busy_scene(robot: Robot) -> Scene:
@@ -54,7 +54,7 @@ def swung(subject: Subject, *, watched: bool = False, **options: Any) -> Motion:
         world.follow(_swing(scene, subject.timestep, 0.2))
         if watched:
             world.read_again()
-        return logged(world.wait(1.0, log_period=0.02))
+        return world.wait(1.0, log_period=0.02)
 
 
 @check(Capability.SAVE_RESTORE, any_robot)
@@ -72,7 +72,7 @@ def restore_repeats(subject: Subject) -> None:
             world.restore()
             now = (world.time, world.bodies.tobytes(), world.joints.tobytes())
             require(now == saved, "the restored state is not the saved one")
-            futures.append(logged(world.wait(0.5, log_period=0.02)))
+            futures.append(world.wait(0.5, log_period=0.02))
             if share is not None:  # lead it astray, to see that the command is restored too
                 world.follow(_swing(scene, subject.timestep, share))
                 world.wait(0.1)
@@ -91,10 +91,10 @@ def restore_continues(subject: Subject) -> None:
             world.wait(0.1)
             if interrupted:
                 world.save()
-            runs.append(logged(world.wait(0.5, log_period=0.02)))
+            runs.append(world.wait(0.5, log_period=0.02))
             if interrupted:
                 world.restore()
-                runs.append(logged(world.wait(0.5, log_period=0.02)))
+                runs.append(world.wait(0.5, log_period=0.02))
     require_same("saved and uninterrupted run", runs[1], runs[0])
     require_same("restored and uninterrupted run", runs[2], runs[0])
 
@@ -110,7 +110,7 @@ def restore_in_the_grip(subject: Subject) -> None:
         futures = []
         for _ in range(2):
             world.restore()
-            futures.append(logged(world.wait(0.5, log_period=0.02)))
+            futures.append(world.wait(0.5, log_period=0.02))
     require_same("second and first future in the grip", futures[1], futures[0])
 
 

@@ -168,7 +168,7 @@ class Subject:
     def motion(self, scene: Scene, seconds: float, log_period: float) -> Motion:
         """What happens by itself in `scene`."""
         with self.world(scene) as world:
-            return logged(world.wait(seconds, log_period=log_period))
+            return world.wait(seconds, log_period=log_period)
 
 
 def asked(subject: Subject, *laws: Law, within: float | None = None) -> None:
@@ -183,17 +183,6 @@ def asked(subject: Subject, *laws: Law, within: float | None = None) -> None:
             found = law.measure(world)
         limit = found.tolerance if within is None else within
         require_close(f"{law.name}: {law.quantity}", found.value, found.exact, limit, law.unit)
-
-
-def logged(motion: Motion | None) -> Motion:
-    """The motion, which must be there.
-
-    Raises:
-        ConformanceFailure: the worker returned none.
-    """
-    if motion is None:
-        raise ConformanceFailure("a motion was asked for with a log, but none came back")
-    return motion
 
 
 def close_workers() -> None:

@@ -163,7 +163,7 @@ def test_robots_and_their_files(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert status == 0
     lines = (
         "small: 3 arm joints, 2 fingers that open to 0.04 m, base at (0.1, 0, 0.2)",
-        "    no stacking: robot 'small' cannot handle a cube at (0.12, -0.18, 0.20): it is *",
+        "    no stacking: robot 'small' cannot handle a cube at (0.12, -0.18, 0.20): *",
         "    no throwing: robot 'small' has no swing for the throw: write one into its file*",
         "    no pushing: robot 'small' cannot push the block: unreachable: *",
     )

@@ -78,80 +78,61 @@ def inertial(mass: float, com: Any, inertia: Any) -> dict[str, Any]:
     return {"mass": mass, "com": com, "inertia": inertia, "damping": [0, 0], "gravity": 1}
 
 
-SURFACE = {"restitution": 0, "margin": 0}
+BARE = {"boxes": NONE, "meshes": NONE, "rounds": NONE}
+SOLID: dict[str, Any] = {**BARE, "restitution": 0, "margin": 0}
 
 
 def expected() -> dict[str, Any]:
     """All of it by hand. The shoulder, turned by 90 degrees like the base, points backwards."""
     tensor = [[0.01, 0.001, 0], [0.001, 0.02, 0], [0, 0, 0.015]]
     groups: dict[str, Mapping[str, Any]] = {
-        "body/free": {
+        "body/free": SOLID | {
             "pose": FREE.pose.as_array(),
             "boxes": [box_reach((0, 0, 0), (0.1, 0.2, 0.4))],
-            "meshes": NONE,
-            "rounds": NONE,
             "friction": 0.7,
             "dynamic": 1,
             "touches": [1, 1, 1],
             "velocity": [0.1, 0, -0.2, 0, 0, 3],
-            **SURFACE,
             **inertial(0.3, [0, 0, 0], np.diag([0.005, 0.00425, 0.00125])),
         },
-        "body/shelf": {
+        "body/shelf": SOLID | {
             "pose": [-0.5, 0, 0.1, 1, 0, 0, 0],
             "boxes": [box_reach((0, 0, 0), (0.2, 0.2, 0.2))],
-            "meshes": NONE,
-            "rounds": NONE,
             "friction": 0.6,
             "dynamic": 0,
             "touches": [0, 1, 1],
-            **SURFACE,
         },
-        "body/pill": {
+        "body/pill": SOLID | {
             "pose": [-1, 0, 0.5, 1, 0, 0, 0],
-            "boxes": NONE,
-            "meshes": NONE,
             "rounds": [0.1 + 0.2 * np.abs(DIRECTIONS[:, 2])],
             "friction": 1,
             "dynamic": 0,
             "touches": [0, 1, 1],
-            **SURFACE,
             "restitution": 0.4,
         },
-        "link/base": {
+        "link/base": SOLID | {
             "pose": [0, 0, 0, 1, 0, 0, 0],
             "boxes": [box_reach((0.1, 0.2, 0.3), (0.1, 0.2, 0.1))],
-            "meshes": NONE,
-            "rounds": NONE,
             "friction": 0.9,
             "touches": [0, 1, 0],
-            **SURFACE,
         },
-        "link/upper": {
+        "link/upper": SOLID | {
             "pose": [0.1, 0.2, 0.5, 0, 0, 0, 1],
             "boxes": [box_reach((0, 0, 0.1), (0.1, 0.1, 0.2))],
             "meshes": [corner_reach(0.0)],
-            "rounds": NONE,
             "friction": 0.9,
             "touches": [1, 1, 0],
-            **SURFACE,
             **inertial(1.0, [0, 0, 0.1], tensor),
         },
-        "link/hand": {
+        "link/hand": SOLID | {
             "pose": [0.1, 0.15, 0.5, 0, 0, 0, 1],
-            "boxes": NONE,
             "meshes": [corner_reach(0.03)],
-            "rounds": NONE,
             "friction": 0.9,
             "touches": [1, 1, 0],
-            **SURFACE,
             **inertial(0.5, [0, 0, 0], 0.01 * np.eye(3)),
         },
-        "link/tip": {
+        "link/tip": BARE | {
             "pose": [0.1, 0.15, 0.5, 0, 0, 0, 1],
-            "boxes": NONE,
-            "meshes": NONE,
-            "rounds": NONE,
             **inertial(0.2, [0, 0, 0], 0.01 * np.eye(3)),
         },
         "joint/shoulder": {

@@ -254,7 +254,6 @@ def moves(
         world = loaded(worlds, name, changes)
         world.follow(Trajectory.holding(0.1, GOAL))
         motion = world.wait(SECONDS, log_period=0.0)
-        assert motion is not None
         return hashlib.sha256(motion.bodies.tobytes() + motion.joints.tobytes()).hexdigest()
     sum_ = hashlib.sha256()
     with here(name, changes) as simulator:

@@ -53,11 +53,11 @@ class Scripted:
     def pose(self, name: str) -> Pose:
         raise KeyError(name)
 
-    def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion | None:
+    def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion:
         self.followed.append(trajectory)
         return self.wait(trajectory.duration, log_period=log_period)
 
-    def wait(self, duration: float, *, log_period: float | None = None) -> Motion | None:
+    def wait(self, duration: float, *, log_period: float | None = None) -> Motion:
         count = round(duration / (log_period or duration))
         times = self.time + np.linspace(duration / count, duration, count)
         self.time, self.joints = float(times[-1]), self.end

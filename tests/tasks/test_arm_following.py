@@ -9,14 +9,12 @@ import pytest
 
 from pytest_simbench.data.pushes import COMMANDS, FREE, PUSH, ArmRun, ArmRuns, Command
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks import ArmFollowing, CorrectedArmFollowing
 from pytest_simbench.tasks.arm_following import CONTROL_PERIOD, REACHED, hands, reference, started
 from pytest_simbench.tasks.arm_pushing import arm
-from tests.conftest import measured
+from tests.conftest import measured, performed
 from tests.tasks.reached import reached
 
 
@@ -57,8 +55,7 @@ def test_what_the_real_arm_made_of_its_commands_is_found_again(runs: ArmRuns) ->
 
 def test_the_hand_goes_where_the_real_one_went(case: Case, runs: ArmRuns) -> None:
     def followed(task: ArmFollowing, number: int) -> Record:
-        record, error = Repetition(Experiment(case, task), number).run()
-        assert error is None
+        record = performed(case, task, number)
         assert record.details["joint_error"] < 0.002  # rad: the drives do what they are told
         assert record.settings["task.half"] == "held_out"
         return record

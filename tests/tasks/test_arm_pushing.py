@@ -11,15 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from pytest_simbench.data import DataError
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.kinematics import track
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import ArmPushing
 from pytest_simbench.tasks.arm_pushing import compared, described
-from tests.conftest import measured
+from tests.conftest import measured, performed
 
 URDF = """<robot name="arm">
   <joint name="m1n6s300_joint_1" type="continuous"><limit lower="-6" upper="6"/></joint>
@@ -63,8 +61,7 @@ def test_a_tool_is_tracked_to_a_micrometre_and_held_joints_stay() -> None:
 
 def test_the_cube_goes_where_the_real_one_went(case: Case) -> None:
     task = ArmPushing(measured("arm_pushes"))
-    record, error = Repetition(Experiment(case, task), 1).run()
-    assert error is None
+    record = performed(case, task)
     assert record.details["hand_error"] < 1e-3  # rad
     assert record.metrics["displacement_error"] < 0.01
     assert record.metrics["turn_error"] < 5.0

@@ -8,22 +8,19 @@ import numpy as np
 import pytest
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import STANDARD_GRAVITY
 from pytest_simbench.tasks import Carrying, Jitter, Slipping
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.carrying import ACCELERATION, FRICTION, Shape
-from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, slip
+from tests.conftest import performed
+from tests.tasks.scripted import Mishap, ScriptedProcess, perform, slip
 
 TASK = Carrying(still=1.0)
 
 
 def carried(*script: Mishap, task: Carrying = TASK) -> tuple[Outcome, ScriptedProcess]:
-    process = ScriptedProcess(script)
-    world = ScriptedWorld(process, task.scene(1, Jitter(0.0, 0.0)))
-    return task.perform(world, 1, lambda done, of: None), process
+    return perform(task, *script, jitter=Jitter(0.0, 0.0))
 
 
 def test_a_perfect_hand_has_no_error() -> None:
@@ -80,8 +77,7 @@ def test_who_cannot_carry_it_is_told_beforehand() -> None:
 
 @pytest.mark.parametrize("task", [TASK, Slipping(still=1.0)], ids=lambda task: task.name)
 def test_on_an_engine(case: Case, task: Carrying) -> None:
-    record, error = Repetition(Experiment(case, task), 1).run()
-    assert error is None
+    record = performed(case, task)
     assert record.metrics["held"] == task.references["held"]
 
 

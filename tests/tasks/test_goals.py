@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,15 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.kinematics import DOWNWARD
 from pytest_simbench.motion.registry import known_robot
-from pytest_simbench.records.record import Record
 from pytest_simbench.scene import Pose
 from pytest_simbench.scene.policy import Command, Observation
 from pytest_simbench.tasks import GoalTask, Jitter, PickAndPlace, PushingToGoal, Reaching
 from pytest_simbench.tasks.goals import digest
+from tests.conftest import performed
 
 TASKS = (Reaching, PushingToGoal, PickAndPlace)
 
@@ -83,15 +80,9 @@ def test_a_record_tells_which_policy_it_was() -> None:
     assert digest(Held(1.0)) == digest(Held(1.0)) != digest(Held(2.0))
 
 
-def run(case: Case, task: GoalTask, **changes: Any) -> Record:
-    record, error = Repetition(Experiment(replace(case, **changes), task), 1).run()
-    assert error is None
-    return record
-
-
 @pytest.mark.engine
 def test_who_gets_there_succeeds_and_is_done_early(case: Case) -> None:
-    record = run(case, Reaching(to_the_goal, rate=10.0))
+    record = performed(case, Reaching(to_the_goal, rate=10.0))
     assert record.metrics["success"] == 1.0
     assert record.metrics["distance"] < 1e-3
     assert 0.1 <= record.metrics["time"] <= 1.0
@@ -103,7 +94,7 @@ def test_who_gets_there_succeeds_and_is_done_early(case: Case) -> None:
 @pytest.mark.engine
 @pytest.mark.parametrize("kind", TASKS)
 def test_who_does_nothing_fails(case: Case, kind: type[GoalTask]) -> None:
-    record = run(case, kind(limp, seconds=1.0))
+    record = performed(case, kind(limp, seconds=1.0))
     assert (record.metrics["success"], record.metrics["time"]) == (0.0, None)
     assert record.metrics["distance"] > 0.05
     assert record.details["acted"] == pytest.approx(1.0)
@@ -112,7 +103,7 @@ def test_who_does_nothing_fails(case: Case, kind: type[GoalTask]) -> None:
 
 @pytest.mark.engine
 def test_the_motion_is_kept_for_the_replay(case: Case) -> None:
-    run(case, Reaching(limp, seconds=1.0), trace="on")
+    performed(replace(case, trace="on"), Reaching(limp, seconds=1.0))
     (trace,) = (case.folder / "traces").glob("*.npz")
     times = np.load(trace)["time"]
     assert times.size >= 75

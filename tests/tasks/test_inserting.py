@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import Pose
-from pytest_simbench.tasks import Inserting, Jitter, Oversized
+from pytest_simbench.tasks import Inserting, Oversized
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.inserting import ASIDE, CHAMFER, HIGH, HOLE, LONG, WIDE, Section
-from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, slip
+from tests.conftest import performed
+from tests.tasks.scripted import Mishap, ScriptedProcess, perform, slip
 
 SECTIONS = get_args(Section)
 
@@ -37,10 +36,9 @@ class Process(ScriptedProcess):
 
 
 def inserted(task: Inserting, *script: Mishap, misfit: float = 0.0, seed: int = 1) -> Outcome:
-    process = Process(script)
+    process = Process()
     process.misfit = misfit
-    world = ScriptedWorld(process, task.scene(seed, Jitter()))
-    return task.perform(world, seed, lambda done, of: None)
+    return perform(task, *script, seed=seed, process=process)[0]
 
 
 @pytest.mark.parametrize("section", SECTIONS)
@@ -136,8 +134,7 @@ def test_who_cannot_insert_it_is_told_beforehand() -> None:
 
 @pytest.mark.parametrize("task", [Inserting(), Oversized()], ids=lambda task: task.name)
 def test_on_an_engine(case: Case, task: Inserting) -> None:
-    record, error = Repetition(Experiment(case, task.smoke()), 1).run()
-    assert error is None
+    record = performed(case, task.smoke())
     assert record.metrics["inserted"] == task.references["inserted"]
     assert record.metrics["overlap"] < 0.05
     assert record.details["added"] == 0.0

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.scene import Pose
 from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.tasks import Jitter, Nesting
 from pytest_simbench.tasks.nesting import FLOOR, FRICTION, HEIGHT, LEAN, STEP, THICK, a_bowl
+from tests.conftest import performed
 
 
 def depth(step: float) -> float:
@@ -51,8 +50,7 @@ def test_a_bowl_turns_as_its_parts() -> None:
 
 
 def test_on_an_engine(case: Case) -> None:
-    record, error = Repetition(Experiment(case, Nesting().smoke()), 1).run()
-    assert error is None
+    record = performed(case, Nesting().smoke())
     assert record.metrics["height_error"] < 0.1
     assert record.metrics["tilt"] < 0.1
 

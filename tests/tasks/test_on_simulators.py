@@ -19,7 +19,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks import Stacking, Throwing
-from tests.conftest import ADAPTERS, able_to, case_of
+from tests.conftest import ADAPTERS, able_to, case_of, performed
 
 THROW = Throwing(settle=1.0)
 
@@ -39,8 +39,7 @@ def thrown(case: Case) -> tuple[Record, Exception | None]:
 
 
 def test_two_cubes_are_stacked(any_case: Case) -> None:
-    record, error = Repetition(Experiment(any_case, Stacking().smoke()), 1).run()
-    assert error is None
+    record = performed(any_case, Stacking().smoke())
     assert record.metrics["at_end_strict"] == 1.0
     assert record.metrics["untouched_moved"] == 0.0
     assert record.seconds["total"] >= sum(

@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import FloatArray
 from pytest_simbench.tasks import Jitter, Opening
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.opening import BAR, DRAWER
-from tests.conftest import case_of
-from tests.tasks.scripted import ScriptedProcess, ScriptedWorld
+from tests.conftest import case_of, performed
+from tests.tasks.scripted import ScriptedProcess, perform
 
 TASK = Opening()
 
@@ -59,8 +57,7 @@ class PerfectHand(ScriptedProcess):
 
 
 def opened(task: Opening = TASK, **how: float) -> Outcome:
-    world = ScriptedWorld(PerfectHand(**how), task.scene(1, Jitter(0.0, 0.0)))
-    return task.perform(world, 1, lambda done, of: None)
+    return perform(task, jitter=Jitter(0.0, 0.0), process=PerfectHand(**how))[0]
 
 
 def test_a_perfect_hand_has_no_error() -> None:
@@ -100,8 +97,7 @@ def test_who_cannot_open_it_is_told_beforehand() -> None:
 @pytest.mark.parametrize("name", ["mujoco", "drake"])  # Drake told the forces of the next step
 def test_on_an_engine(case: Case, name: str) -> None:
     task = Opening(rest=0.5)
-    record, error = Repetition(Experiment(case_of(case, name), task), 1).run()
-    assert error is None
+    record = performed(case_of(case, name), task)
     found = record.metrics
     assert found["opened"] == 1.0
     assert found["work"] == pytest.approx(1.0, abs=0.01)

@@ -11,13 +11,12 @@ import pytest
 
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Pose, Scene, Sphere
 from pytest_simbench.tasks import Jitter, Outcome, Task
 from pytest_simbench.tasks.base import Count, Randomness, distance
 from pytest_simbench.tasks.manipulator import Manipulator
+from tests.conftest import performed
 
 LYING = Pose((0.45, -0.1, 0.02), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
 
@@ -58,7 +57,6 @@ class Moving(Task):
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_it_is_put_where_it_was_wanted(case: Case, shape: str) -> None:
-    record, error = Repetition(Experiment(case, Moving(SHAPES[shape])), 1).run()
-    assert error is None
+    record = performed(case, Moving(SHAPES[shape]))
     assert record.details["lifted"] > 0.095
     assert record.details["error"] < 0.02  # a ball and a peg may roll or lean as they are let go

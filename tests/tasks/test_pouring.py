@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.scene import Pose
 from pytest_simbench.tasks import Jitter, Pouring
 from pytest_simbench.tasks.pouring import RADIUS, SPACING, TRAY
+from tests.conftest import performed
 
 
 @pytest.mark.parametrize("balls", [1, 6, 10, 30, 100])
@@ -60,6 +59,5 @@ def test_what_leaks_and_what_misses_the_tray_is_counted() -> None:
 
 
 def test_on_an_engine(case: Case) -> None:
-    record, error = Repetition(Experiment(case, Pouring().smoke()), 1).run()
-    assert error is None
+    record = performed(case, Pouring().smoke())
     assert record.metrics == {"in_tray": 1.0, "leaked": 0.0}

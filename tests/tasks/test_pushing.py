@@ -13,8 +13,6 @@ from hypothesis import strategies as st
 
 from pytest_simbench.client.errors import Diverged
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.kinematics import DOWNWARD
 from pytest_simbench.motion.panda import panda
@@ -22,7 +20,7 @@ from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import CurvePushing, Jitter, Pushing
 from pytest_simbench.tasks.pushing import BLOCK_SIZE, START, lever, smallest_turning_radius
-from tests.conftest import case_of
+from tests.conftest import case_of, performed
 from tests.motion.small_arm import small_arm
 from tests.tasks.scripted import Mishap, ScriptedProcess, fail, move, perform, put, slip
 
@@ -202,8 +200,7 @@ def test_a_small_arm_has_a_scene_of_its_size() -> None:
 def test_the_smallest_arm_pushes_too(case: Case) -> None:
     """One jaw that turns, five joints: the block goes where it should, within its jitter."""
     case = replace(case_of(case, "mujoco"), robot=find("so101"))
-    record, error = Repetition(Experiment(case, LINE), 1).run()
-    assert error is None
+    record = performed(case, LINE)
     assert "failed_push" not in record.details
     assert record.metrics["position_error"] < 0.0025
     assert record.metrics["tipped"] == 0.0
@@ -218,8 +215,7 @@ def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
 @pytest.mark.parametrize("task", [LINE, CURVE], ids=["line", "curve"])
 def test_on_simulators(case: Case, name: str, task: Pushing) -> None:
     """Within the jitter of the start, which is 1 mm in x and y, and a turn of 1 degree."""
-    record, error = Repetition(Experiment(case_of(case, name), task), 1).run()
-    assert error is None
+    record = performed(case_of(case, name), task)
     assert "failed_push" not in record.details
     assert record.metrics["position_error"] < 0.005
     assert record.metrics["heading_error"] < 1.0

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.executor import LocalExecutor
-from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.scene_file import read_scene_file
 from pytest_simbench.recordings.logs import read_log
 from pytest_simbench.scene import Pose, SceneError, Start, Trajectory
 from pytest_simbench.tasks import Log, Replaying
 from pytest_simbench.tasks.replaying import turn
-from tests.conftest import case_of
+from tests.conftest import case_of, performed
 from tests.tasks.scripted_scene import SCENE, Scripted
 from tests.tasks.test_holding import ARM
 
@@ -72,13 +68,6 @@ def test_turns_are_angles_whatever_the_quaternions_signs() -> None:
     assert turn(a, a) == 0.0
 
 
-def run(task: Replaying, case: Case) -> Any:
-    with closing(LocalExecutor()) as executor:
-        record, _ = executor.repetition(Experiment(case, task), 1).run()
-    assert record.ok, record.error
-    return record
-
-
 @pytest.mark.engine
 @pytest.mark.parametrize("profile", ["tuned", "file"])
 def test_an_arm_follows_a_slow_log_and_a_ball_that_rests_stays(
@@ -93,7 +82,7 @@ def test_an_arm_follows_a_slow_log_and_a_ball_that_rests_stays(
     np.savez(tmp_path / "log.npz", time=time, **columns, **{"ball/pose": ball})
     case = replace(case_of(case, "mujoco"), profile=profile)
     task = Replaying(scene, read_log(tmp_path / "log.npz", scene))
-    metrics = run(task, case).metrics
+    metrics = performed(case, task).metrics
     assert 1.2 < metrics["error_hinges"] < 1.5  # the sag of its spring: 1.4 degrees
     assert 0.5 < metrics["worst_sliders"] < 40  # a drive without a velocity lags by d v / k
     assert metrics["off"] < 1.0
@@ -101,4 +90,4 @@ def test_an_arm_follows_a_slow_log_and_a_ball_that_rests_stays(
     ball[-1, :2] += 0.3, 0.4
     np.savez(tmp_path / "log.npz", time=time, **columns, **{"ball/pose": ball})
     task = Replaying(scene, read_log(tmp_path / "log.npz", scene))
-    assert run(task, case).metrics["off"] == pytest.approx(500.0, abs=1.0)
+    assert performed(case, task).metrics["off"] == pytest.approx(500.0, abs=1.0)

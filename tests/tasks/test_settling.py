@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
@@ -11,13 +10,11 @@ import numpy as np
 import pytest
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.executor import LocalExecutor
-from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.scene import Box, Compound, Pose, Scene, SceneError, Start
 from pytest_simbench.tasks import Jitter, Settling, rests_on
 from pytest_simbench.tasks.resting import spread
 from pytest_simbench.tasks.settling import deepest, kinetic_energy, tilted
-from tests.conftest import case_of
+from tests.conftest import performed
 
 NONE = Jitter(0.0, 0.0)
 FRAME = Pose((0.0, 0.0, -0.05), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
@@ -101,10 +98,7 @@ def test_the_spread_of_forces_is_of_the_weight() -> None:
 @pytest.mark.engine
 def test_a_stool_rests_on_a_slab_and_a_premise_that_fails_says_so(case: Case) -> None:
     premises = [rests_on("stool", "slab"), rests_on("slab", "stool")]
-    experiment = Experiment(case_of(case, "mujoco"), Settling(SCENE, premises))
-    with closing(LocalExecutor()) as executor:
-        record, _ = executor.repetition(experiment, 1).run()
-    assert record.ok, record.error
+    record = performed(case, Settling(SCENE, premises))
     assert record.metrics["premises"] == 0.5
     assert record.reasons == ("not: slab rests on stool (within 20 mm, tilt at most 20 deg)",)
     assert record.metrics["farthest"] == pytest.approx(10.0, abs=1.0)

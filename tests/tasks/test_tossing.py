@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -101,11 +102,8 @@ def test_records_name_the_tosses_by_their_digest() -> None:
 
 def tossed(case: Case, task: Tossing, numbers: Sequence[int]) -> list[Record]:
     """Repetitions, one after the other as a run does it."""
-    executor, experiment = LocalExecutor(), Experiment(case, task)
-    try:
-        made = [executor.repetition(experiment, number).run() for number in numbers]
-    finally:
-        executor.close()
+    with closing(LocalExecutor()) as executor:
+        made = [executor.repetition(Experiment(case, task), number).run() for number in numbers]
     for _, error in made:
         assert error is None
     return [record for record, _ in made]

@@ -46,16 +46,14 @@ class Gliding:
     def stats(self) -> dict[str, dict[str, float]]:
         return {"stepping": {"simulated": self.time}}
 
-    def wait(self, duration: float, *, log_period: float | None = None) -> Motion | None:
+    def wait(self, duration: float, *, log_period: float | None = None) -> Motion:
         self.asked += 1
         assert log_period is not None
         steps, every = (max(1, round(t / self.timestep)) for t in (duration, log_period))
         times = self.time + self.timestep * np.arange(every, steps + 1, every)
         self.time += steps * self.timestep
-        if not len(times):
-            return None
-        joints, bodies = zip(*map(self.row, times), strict=True)
-        return Motion(times, np.array(joints), np.array(bodies))
+        joints, bodies = ([self.row(t)[part] for t in times] for part in (0, 1))
+        return Motion(times, np.reshape(joints, (-1, 2, 1)), np.reshape(bodies, (-1, 2, 13)))
 
 
 def waited(
