@@ -31,6 +31,7 @@ from published_runs import PUBLISHED
 from tables import DATA, DOCS, table
 
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.report.markdown.capabilities import all_capabilities
 
 README = DOCS.parent / "README.md"
 MARK = re.compile(r"<!-- made: ([\w ]+) -->\n(?:(?:(?!<!-- made:).)*?<!-- end -->\n?)?", re.S)
@@ -60,6 +61,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "commands": make_options.commands,
     "marks": make_options.marks,
     "fixtures": make_options.fixture_table,
+    "capabilities": all_capabilities,
     "known_failures": make_options.known_failures,
 }
 """By the first word of a mark, the others are arguments; beside those of `make_results`."""

@@ -14,7 +14,6 @@ from pytest_simbench.cli.main import INTERRUPTED
 from pytest_simbench.cli.runs import RUNS
 from pytest_simbench.cli.searching import BUDGET, begins_with, runs_in
 from pytest_simbench.cli.selection import Selection, check
-from pytest_simbench.cli.tables import aligned
 from pytest_simbench.cli.values import BadInput, refusing
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
@@ -26,6 +25,7 @@ from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.files import shown
+from pytest_simbench.report.terminal.grid import aligned
 from pytest_simbench.tasks import Fitting
 from pytest_simbench.tuning.fitting import Fit, State
 from pytest_simbench.tuning.search import folder_name

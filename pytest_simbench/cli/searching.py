@@ -16,7 +16,7 @@ from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.paths import FolderError
 from pytest_simbench.records.record import RecordError
 from pytest_simbench.simulator.profile_file import ProfileFile
-from pytest_simbench.tuning.runs import Runs
+from pytest_simbench.tuning.trials import Runs
 
 BUDGET = 1800.0
 """[s]"""

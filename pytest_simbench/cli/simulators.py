@@ -8,11 +8,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 from pytest_simbench.cli.names import read_names
-from pytest_simbench.cli.tables import aligned
 from pytest_simbench.client import environments
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.report.model.capabilities import columns
-from pytest_simbench.report.terminal.grid import render
+from pytest_simbench.report.terminal.grid import aligned, render
 from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
 from pytest_simbench.simulator.settings import Settings, in_words, meanings, searched
 

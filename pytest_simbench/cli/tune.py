@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from pytest_simbench.experiment.variants import Variant
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.records.paths import write_whole
-from pytest_simbench.report.figures.drawing import FiguresUnavailable, drawing, write
+from pytest_simbench.report.figures.drawing import FiguresUnavailable, Picture, write
 from pytest_simbench.report.figures.front import draw
 from pytest_simbench.report.files import shown
 from pytest_simbench.simulator.registry import adapter, known
@@ -172,9 +173,9 @@ def _search(
             print(f"profile: {shown(path / f'{name}.tuned.toml', Path.cwd())}")
         today, *points = [(c.cost(), looks.error(c)) for c in (done[0], *finished(done))]
         line = [(c.cost(), looks.error(c)) for c in front(done, looks)]
-        with suppress(FiguresUnavailable), drawing(), refusing(OSError, str(path)):
-            figure = draw(points, line, today, wanted.cost, wanted.unit)
-            print(f"picture: {shown(write(path, [('front', figure)])[0], Path.cwd())}")
+        picture = Picture("front", partial(draw, points, line, today, wanted.cost, wanted.unit))
+        with suppress(FiguresUnavailable), refusing(OSError, str(path)):
+            print(f"picture: {shown(write(path, [picture])[0], Path.cwd())}")
     return result
 
 

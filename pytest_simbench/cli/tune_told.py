@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from pytest_simbench.cli.tables import aligned
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.ground.versions import base_name
 from pytest_simbench.measure.intervals import Interval
 from pytest_simbench.records.metrics import significant
+from pytest_simbench.report.terminal.grid import aligned
 from pytest_simbench.simulator.profile_file import write_profile
 from pytest_simbench.simulator.settings import in_words
 from pytest_simbench.tasks.measured import MeasuredTask

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 from pytest_simbench.ground.text import for_terminal
 
@@ -140,8 +140,7 @@ JITTER = Number(0, 1000)
 _JOBS = Number(1, 256, whole=True)
 
 
-@dataclass(frozen=True)
-class Auto:
+class Auto(NamedTuple):
     """`--reps auto`: repeat until the claims are decided, at most `limit` times."""
 
     limit: int
@@ -271,8 +270,7 @@ def address(text: str) -> str:
     return str(_matched(text, form, advice, lambda found: 0 < int(found[3]) < 65536)[0])
 
 
-@dataclass(frozen=True)
-class Releases:
+class Releases(NamedTuple):
     """The last `number` releases of a simulator; of each minor version the last, if `minor`."""
 
     name: str
@@ -288,8 +286,7 @@ def releases(text: str) -> Releases:
     return Releases(found[1], int(found[2]), bool(found[3]))
 
 
-@dataclass(frozen=True)
-class Span:
+class Span(NamedTuple):
     """Releases of a simulator from a good one to a bad one."""
 
     name: str

@@ -139,7 +139,6 @@ class Looking:
     """What a policy is shown beside the state.
 
     Attributes:
-        forces: contact forces.
         picture: width and height of a picture [pixels]; None: none.
     """
 

@@ -20,7 +20,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import distributions
 from pathlib import Path
@@ -61,11 +61,7 @@ def default_folder() -> Path:
 
 @dataclass(frozen=True)
 class Environment:
-    """The environment of one simulator, whether it exists or not.
-
-    Attributes:
-        folder: of this environment.
-    """
+    """The environment of one simulator, whether it exists or not."""
 
     info: SimulatorInfo
     folder: Path
@@ -133,7 +129,12 @@ class Environment:
             )
         if wrong := foreign(self.folder):
             raise SimulatorError(wrong)
-        self._check_release()
+        name = VersionedName.of(self.info.name)
+        if name.kind == RELEASE:
+            with suppress(package_index.PackageIndexError):  # then installing it tells
+                known = package_index.releases(self.info.distribution)
+                if wrong := package_index.unreleased(self.info.distribution, name.which, known):
+                    raise SimulatorError(f"{self.info.name}: {wrong}")
 
     def create(self, tell: Tell = lambda text: None) -> None:
         """Make it anew, unless another process has made it meanwhile.
@@ -180,19 +181,6 @@ class Environment:
         for command in commands:
             _run(command, variables, look)
         look("\n")
-
-    def _check_release(self) -> None:
-        """Complain of a release that there is not, where a package index can be asked."""
-        name = VersionedName.of(self.info.name)
-        if name.kind != RELEASE:
-            return
-        try:
-            known = package_index.releases(self.info.distribution)
-        except package_index.PackageIndexError:
-            return
-        problem = package_index.unreleased(self.info.distribution, name.which, known)
-        if problem:
-            raise SimulatorError(f"{self.info.name}: {problem}")
 
 
 def create_all(environments: Sequence[Environment], tell: Tell) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,10 @@ class Motion:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def at(self, rows: Any) -> Motion:
+        """Some of the samples."""
+        return Motion(self.time[rows], self.joints[rows], self.bodies[rows])
 
     @classmethod
     def of(cls, states: Sequence[Observation]) -> Motion:

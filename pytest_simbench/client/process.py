@@ -129,13 +129,9 @@ class WorkerProcess:
             "exchange": self._connection.descriptor,
         }
 
-    @property
-    def _elsewhere(self) -> bool:
-        return elsewhere(self.launch.spec)
-
     def _packages(self) -> dict[str, str]:
         """Where the packages that the worker needs lie: this one, the adapters, a third party's."""
-        if self._elsewhere:
+        if elsewhere(self.launch.spec):
             return {}  # another host has its own installation
         names = {"pytest_simbench", "pytest_simbench.sims"}
         names.add(self.launch.adapter.partition(":")[0].split(".")[0])
@@ -249,7 +245,6 @@ class WorkerProcess:
         Args:
             take: gets each frame, in another thread, while a motion is asked for; must not raise.
                 The time that drawing takes puts the deadline off. None: no more pictures.
-            period: [s].
             size: width and height [pixels].
         """
 
@@ -330,7 +325,7 @@ class WorkerProcess:
         return self._ended_by(RepetitionTimeout, what + self._crowding())
 
     def _crowding(self) -> str:
-        return "" if self._elsewhere or self.pid is None else crowding(self.pid)
+        return "" if elsewhere(self.launch.spec) or self.pid is None else crowding(self.pid)
 
     def _start_text(self, reason: str) -> str:
         interpreter = self.launch.spec or self.launch.python or "this interpreter"

@@ -19,7 +19,6 @@ from pytest_simbench.client.world import World
 from pytest_simbench.scene import FloatArray, Scene, SceneError
 
 ARRAYS = ("position", "velocity", "effort")
-Rows = dict[str, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -74,56 +73,43 @@ class Latency:
     def __init__(self, delay: float) -> None:
         self.delay = delay
         self._tick = 0.0
-        self._last: Rows = {}
-        self._asked: Rows = {}
-        self._queue: Rows = {}
+        # Rows of `ARRAYS`, (3, n, n_joints): the one that acts now, and those on their way.
+        self._queue: FloatArray = np.empty((3, 0, 0))
+        self._asked: FloatArray = self._queue
 
     def late(self, operation: Operation) -> list[Operation]:
         """What the drives get to see while `operation` is asked for."""
         if operation.kind == "follow":
-            return [self._late_motion(operation)]
-        return self._late_wait(operation) if self._queue else [operation]
-
-    def _late_motion(self, operation: Operation) -> Operation:
-        rows = {name: operation.arguments[name] for name in ARRAYS}
-        if not self._queue:  # until the first motion arrives, the arm is held where it is
-            self._tick = float(operation.arguments["tick"])
-            self._last = _held(rows, 0)
-            self._queue = _repeated(self._last, round(self.delay / self._tick))
-        self._asked = _held(rows, -1)
-        # Row 0 of a trajectory is where the one before ended.
-        self._push({name: rows[name][1:] for name in ARRAYS})
-        return self._pop(len(rows["position"]) - 1, operation.phase)
-
-    def _late_wait(self, operation: Operation) -> list[Operation]:
-        count = min(len(self._queue["position"]), round(operation.duration / self._tick))
-        if count == 0:
+            rows = np.stack([operation.arguments[name] for name in ARRAYS])
+            if not self._queue.size:  # until the first motion arrives, the arm is held where it is
+                self._tick = float(operation.arguments["tick"])
+                self._queue = _held(rows[:, :1], 1 + round(self.delay / self._tick))
+            self._asked = rows[:, -1:]
+            # Row 0 of a trajectory is where the one before ended.
+            return [self._passed(rows[:, 1:], operation.phase)]
+        ticks = round(operation.duration / self._tick) if self._tick else 0
+        count = min(self._queue.shape[1] - 1, ticks)
+        if count <= 0:
             return [operation]
-        self._push(_repeated(self._asked, count))
-        late = self._pop(count, operation.phase)
+        late = self._passed(_held(self._asked, count), operation.phase)
         rest = operation.duration - late.duration
         if rest < self._tick / 2:
             return [late]
         return [late, Operation("wait", {"duration": rest}, operation.phase)]
 
-    def _push(self, rows: Rows) -> None:
-        self._queue = {k: np.concatenate([self._queue[k], rows[k]]) for k in ARRAYS}
-
-    def _pop(self, count: int, phase: str) -> Operation:
-        now = {k: np.concatenate([self._last[k], self._queue[k][:count]]) for k in ARRAYS}
-        self._queue = {name: self._queue[name][count:] for name in ARRAYS}
-        self._last = {name: now[name][-1:] for name in ARRAYS}
-        return Operation("follow", {"tick": self._tick, **now}, phase)
+    def _passed(self, rows: FloatArray, phase: str) -> Operation:
+        """The motion of so many of the oldest rows, once these have joined the others."""
+        queue, count = np.concatenate([self._queue, rows], axis=1), rows.shape[1]
+        self._queue = queue[:, count:]
+        motion = dict(zip(ARRAYS, queue[:, : count + 1], strict=True))
+        return Operation("follow", {"tick": self._tick, **motion}, phase)
 
 
-def _held(rows: Rows, number: int) -> Rows:
-    """One row of a trajectory as a set point to stay at."""
-    row = {name: rows[name][number][None] for name in ARRAYS}
-    return {**row, "velocity": np.zeros_like(row["velocity"])}
-
-
-def _repeated(row: Rows, count: int) -> Rows:
-    return {name: np.repeat(row[name], count, axis=0) for name in ARRAYS}
+def _held(row: FloatArray, count: int) -> FloatArray:
+    """A set point, (3, 1, n_joints), to stay at."""
+    held = np.repeat(row, count, axis=1)
+    held[ARRAYS.index("velocity")] = 0.0
+    return held
 
 
 class TapedWorld(World):
@@ -131,7 +117,8 @@ class TapedWorld(World):
 
     Args:
         process, scene, options: as of `World`.
-        period: samples of every operation are kept in `motions` at this period [s]; None: none.
+        period: samples of every operation are kept in `motions` at this period [s], see
+            `World.trace`; None: none.
         play: operations to be carried out in place of those asked for, one by one.
         delay: of the controller [s], see `Latency`.
         before: called before each operation, with the world and the operation about to be done.
@@ -155,10 +142,9 @@ class TapedWorld(World):
         before: Callable[[TapedWorld, Operation], None] | None = None,
         **options: Any,
     ) -> None:
-        super().__init__(process, scene, **options)
-        self.period = period
+        super().__init__(process, scene, trace_period=period, **options)
         self.tape: list[Operation] = []
-        self.motions: list[Motion] = [] if period is None else [self._kept([])]
+        self.motions: list[Motion] = [] if period is None else [self._kept(0)]
         self.left_at: float | None = None
         self._play = play
         self._latency = Latency(delay) if delay else None
@@ -170,19 +156,15 @@ class TapedWorld(World):
         if self._before is not None:
             self._before(self, wanted)
         self.tape.append(wanted)
-        parts = [
-            self.perform(part, log_period)
-            for part in (self._latency.late(wanted) if self._latency else [wanted])
-        ]
-        found = [part for part in parts if part is not None and len(part)]
-        if self.period is not None:
-            self.motions.append(self._kept(found))
-        return Motion.joined(found) if log_period is not None and found else None
+        begun, late = len(self.trace), self._latency.late(wanted) if self._latency else [wanted]
+        found = [motion for part in late if (motion := self.perform(part, log_period))]
+        if self._trace_period is not None:
+            self.motions.append(self._kept(begun))
+        return Motion.joined(found) if found else None
 
     def perform(self, operation: Operation, log_period: float | None = None) -> Motion | None:
         """Carry out one operation without putting it on the tape."""
-        period = log_period if log_period is not None else self.period
-        return super()._move(operation.kind, period, **operation.arguments)
+        return super()._move(operation.kind, log_period, **operation.arguments)
 
     def control(self, policy: Any, **options: Any) -> Motion:
         """No closed loop: its commands hang on what it sees, so there is no tape of it.
@@ -207,14 +189,8 @@ class TapedWorld(World):
             return asked
         return self._play[number]
 
-    def _kept(self, parts: list[Motion]) -> Motion:
-        """At most one sample for each period, and the end state."""
+    def _kept(self, begun: int) -> Motion:
+        """What the trace has from there on, and the end state."""
+        parts = [motion.at(motion.time < self.time) for motion in self.trace[begun:]]
         end = Motion(np.array([self.time]), self.joints[None], self.bodies[None])
-        kept = []
-        for motion in parts:
-            step = (motion.time[-1] - motion.time[0]) / max(1, len(motion) - 1)
-            every = max(1, round((self.period or 0.0) / step)) if step > 0 else 1
-            at = np.arange(len(motion))[::every]
-            at = at[motion.time[at] < self.time]
-            kept.append(Motion(motion.time[at], motion.joints[at], motion.bodies[at]))
-        return Motion.joined([*kept, end])
+        return Motion.joined([*parts, end])

@@ -43,7 +43,6 @@ class World:
     be, see `scene.plausibility`.
 
     Attributes:
-        scene: what was loaded.
         time: simulated [s].
         joints: position and velocity of the driven joints, (2, n_joints).
         bodies: rows of the free bodies, (n_free, 13): position [m], quaternion w, x, y, z, linear
@@ -300,8 +299,7 @@ class World:
         if len(motion) < 2:
             return motion
         period = (motion.time[-1] - motion.time[0]) / (len(motion) - 1)
-        every = slice(None, None, max(1, round(TRACE_PERIOD / period)))
-        return Motion(motion.time[every], motion.joints[every], motion.bodies[every])
+        return motion.at(slice(None, None, max(1, round(TRACE_PERIOD / period))))
 
     def save(self, name: str = "saved") -> None:
         """Keep the whole state in the worker under `name`."""

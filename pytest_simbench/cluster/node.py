@@ -125,7 +125,6 @@ def carry_out(
     """Carry a repetition out.
 
     Args:
-        job: what to do.
         number: of the repetition; 0 starts and ends the simulator alone.
         slots: of the node; with several at once, records are contended.
         progress: takes how far it is: `phase`, `done`, `total`.

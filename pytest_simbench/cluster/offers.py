@@ -98,7 +98,6 @@ class Node:
 
     Attributes:
         address: of this process of it; one that is started again has another.
-        name: of the node.
         slots: repetitions at once.
         versions: of the plugin, of Python and of its simulators, by name; a release by its own
             name, `mysim==3.3.7`.

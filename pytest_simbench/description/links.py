@@ -15,8 +15,18 @@ from pytest_simbench.scene import Closure, FloatArray, Pose, Robot, Scene, Scene
 from pytest_simbench.scene.pose import vector3
 
 
-def link_poses(prepared: PreparedRobot, positions: Mapping[str, float]) -> dict[str, Pose]:
-    """Pose in the world of every link's frame, by name, at joint positions [rad or m]."""
+def link_poses(
+    prepared: PreparedRobot, positions: Mapping[str, float] | FloatArray | None = None
+) -> dict[str, Pose]:
+    """Pose in the world of every link's frame, by name.
+
+    Args:
+        positions: of the joints [rad or m], by name or (n_joints,); None for the initial ones.
+    """
+    if positions is None:
+        positions = prepared.robot.column("initial_position")
+    if not isinstance(positions, Mapping):
+        positions = dict(zip(prepared.robot.joint_names, positions.tolist(), strict=True))
     poses = {prepared.root: Pose()}
     for joint in prepared.joints:  # parents first
         moved = joint_motion(joint.kind, joint.axis, positions[joint.name])
@@ -99,10 +109,7 @@ def ends(
         closure: one of `reduced`.
         positions: of the joints, (n_joints,); None for the initial ones.
     """
-    robot = prepared.robot
-    if positions is None:
-        positions = robot.column("initial_position")
-    poses = link_poses(prepared, dict(zip(robot.joint_names, positions, strict=True)))
+    poses = link_poses(prepared, positions)
     first, second = (
         np.asarray(poses[link].rotation() @ np.asarray(point) + poses[link].position)
         for link, point in closure.sides
@@ -113,8 +120,7 @@ def ends(
 def frames(prepared: PreparedRobot, closure: Closure) -> tuple[Pose, Pose]:
     """A frame in each link of a reduced closure, at its points: they are one frame of the world
     where the joints start, and stay one where the closure is rigid."""
-    robot = prepared.robot
-    poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
+    poses = link_poses(prepared)
     turn = (poses[closure.second].inverse() * poses[closure.first]).quaternion
     return Pose(closure.first_point), Pose(closure.second_point, turn)
 

@@ -94,15 +94,17 @@ def received(wire: Mapping[str, Any]) -> dict[str, Any]:
     return {**wire, "robot": {**robot, "urdf": str(keep(content["urdf"], content["meshes"]))}}
 
 
-def keep(urdf: str, meshes: Mapping[str, bytes], ending: str = ".urdf") -> Path:
+def keep(
+    urdf: str | ET.Element, meshes: Mapping[str, bytes] | None = None, ending: str = ".urdf"
+) -> Path:
     """Write a description into the folder of this machine, unless it is there; where the URDF is.
 
     Raises:
         OSError: it cannot be written.
     """
-    for name, data in meshes.items():
+    for name, data in (meshes or {}).items():
         _write(folder() / Path(name).name, data)
-    text = urdf.encode()
+    text = (urdf if isinstance(urdf, str) else ET.tostring(urdf, encoding="unicode")).encode()
     return _write(folder() / f"{digest(text)}{ending}", text)
 
 

@@ -17,6 +17,7 @@ from pytest_simbench.description.mesh_check import read_stl, written_stl
 from pytest_simbench.description.urdf import Shape
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import FloatArray, Polytope, Pose
+from pytest_simbench.scene.overlap import box_corners
 from pytest_simbench.scene.polytope import MOST
 
 _GRID = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
@@ -95,11 +96,6 @@ def outlines(
     }
 
 
-def box_corners(size: Sequence[float] | FloatArray) -> FloatArray:
-    """Corners (8, 3) of a box of edge lengths `size` about its centre [m]."""
-    return np.asarray(np.array(list(product((-0.5, 0.5), repeat=3))) * np.asarray(size))
-
-
 def placed(points: FloatArray, pose: Pose) -> FloatArray:
     """Points (n, 3) given in the frame at `pose`."""
     return np.asarray(points @ pose.rotation().T + np.asarray(pose.position))
@@ -107,8 +103,12 @@ def placed(points: FloatArray, pose: Pose) -> FloatArray:
 
 def shape_points(shape: Shape) -> FloatArray:
     """Corners of a box or a mesh in the frame of its link, (n, 3) [m]."""
-    corners = box_corners(shape.size) if shape.size else mesh_points(shape.mesh or "")
-    return placed(corners, shape.pose)
+    return placed(own_points(shape), shape.pose)
+
+
+def own_points(shape: Shape) -> FloatArray:
+    """The same in its own frame."""
+    return box_corners(shape.size) if shape.size else mesh_points(shape.mesh or "")
 
 
 def write_obj(path: Path, mesh: Polytope) -> Path:

@@ -6,22 +6,20 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
-from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
 from pytest_simbench.description.links import link_poses
-from pytest_simbench.description.mesh_check import PACKAGE, read_stl, written_stl
+from pytest_simbench.description.mesh_check import PACKAGE, written_stl
 from pytest_simbench.description.robot_files import content, keep, keep_mesh
-from pytest_simbench.description.shapes import capsule_hull, cylinder_hull
-from pytest_simbench.description.urdf import PreparedRobot, Shape
+from pytest_simbench.description.shapes import capsule_hull, cylinder_hull, own_points
+from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.description.urdf_check import MOVING, Description, read_xml
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import (
     Coupling,
-    FloatArray,
     Gripper,
     Joint,
     Polytope,
@@ -244,20 +242,13 @@ def _unread(root: ET.Element) -> Iterator[tuple[str, ET.Element]]:
 def _lowest(robot: Robot) -> float:
     """Height of the lowest point of any link at the start [m]."""
     prepared = PreparedRobot(robot)
-    poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
+    poses = link_poses(prepared)
     return min(
         (
-            float((_points(shape) @ pose.rotation().T)[:, 2].min() + pose.position[2])
+            float((own_points(shape) @ pose.rotation().T)[:, 2].min() + pose.position[2])
             for name, link in prepared.links.items()
             for shape in link.shapes
             for pose in (poses[name] * shape.pose,)
         ),
         default=0.0,
     )
-
-
-def _points(shape: Shape) -> FloatArray:
-    """Corners in the shape's frame, (n, 3)."""
-    if shape.mesh is not None:
-        return read_stl(Path(shape.mesh).read_bytes()).reshape(-1, 3)
-    return np.array(list(product((-0.5, 0.5), repeat=3))) * (shape.size or 0.0)

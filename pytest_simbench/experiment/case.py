@@ -69,9 +69,7 @@ class Case:
         adapter: `module:Class` of the simulator's adapter.
         changes: single settings changed by the user, by name.
         python, spec: interpreter or execnet specification of the worker.
-        environment: of the worker.
         display: adds to the environment what a window needs, for each worker anew.
-        protocol: how repetitions are run.
         timeout: of a repetition from launch [s]; None for the task's own.
         stall_timeout: longest silence of a worker [s].
         memory_limit: of a worker and its children [MB]; None for no limit.
@@ -87,7 +85,6 @@ class Case:
         compile_timeout: of the compiling [s].
         fresh: start a new worker for each repetition all the same.
         contended: repetitions run side by side, so their times are not comparable.
-        folder: the run folder.
         attempt: of the same repetitions in this process, see `records.record`.
         robot: that does the tasks; None for the tasks' own.
         file: the file that the profile is of; None for one of the adapter's.
@@ -138,7 +135,6 @@ class Case:
         """A case of a registered simulator, as it is run on this machine.
 
         Args:
-            simulator: its name.
             profile: the name of one of its profiles, or a TOML file with one.
             changes: single settings, on top of that.
             python: interpreter of the worker; None for the engine's own, or this one.

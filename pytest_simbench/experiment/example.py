@@ -54,7 +54,6 @@ class Example:
 
     Attributes:
         case: how it is run on this machine.
-        scene, tape: what is run.
         versions: of the packages it was made with, by name; for a comparison.
     """
 
@@ -76,10 +75,7 @@ def write_example(
     Under Hypothesis the last failing example is the smallest, so that is what stays.
 
     Args:
-        case: simulator and settings.
         name: the readable part of the file's name.
-        scene: of the episode.
-        tape: what was done.
 
     Raises:
         OSError: the folder cannot be written to.
@@ -113,7 +109,6 @@ def read_example(
     """An episode from its file, with a run folder of its own. Nothing is started.
 
     Args:
-        path: of the file.
         folder: for the replay's logs.
         mode: instead of the file's.
         python, spec: interpreter or execnet specification of the worker; default: this machine's.

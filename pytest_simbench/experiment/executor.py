@@ -38,10 +38,8 @@ class Executor(ABC):
         """A repetition that has not begun.
 
         Args:
-            experiment: that is repeated.
             number: of the repetition, from 1; 0 starts and ends the simulator alone, so that
                 the record tells its settings and versions.
-            hooks: what is told of it.
         """
 
     def end_test(self) -> None:  # noqa: B027 (nothing to do is fine)

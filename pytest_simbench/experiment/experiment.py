@@ -17,7 +17,6 @@ class Experiment:
     """A task in a case. A test asks for the task; the protocol may want another version of it.
 
     Attributes:
-        case: simulator, mode, settings and limits.
         asked: the task that the test asks for.
     """
 

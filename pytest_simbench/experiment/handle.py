@@ -34,7 +34,6 @@ class SimulatorHandle:
     example is written to a file, and a note on the exception says how to replay it.
 
     Attributes:
-        case: simulator, settings and limits.
         constructed: the simulator that the worker made last.
     """
 
@@ -45,13 +44,12 @@ class SimulatorHandle:
         self._open = False
 
     @contextmanager
-    def episode(self, scene: Scene, *, parity: bool = True, **options: Any) -> Iterator[TapedWorld]:
+    def episode(self, scene: Scene, **options: Any) -> Iterator[TapedWorld]:
         """A freshly loaded world, for as long as the `with` block lasts.
 
         Args:
-            scene: to be loaded.
-            parity: whether to check that the engine built this scene.
-            options: of `TapedWorld`: a tape to be played, a period of samples.
+            options: of `TapedWorld`: a tape to be played, a period of samples; `parity`: whether
+                to check that the engine built this scene.
 
         Raises:
             WorkerError: of whatever kind happens to the worker.
@@ -65,7 +63,7 @@ class SimulatorHandle:
         self._open = True
         tape: list[Any] = []
         try:
-            world = self.world(scene, parity=parity, **options)
+            world = self.world(scene, **options)
             tape = world.tape
             yield world
         except BaseException as error:
@@ -77,7 +75,7 @@ class SimulatorHandle:
         finally:
             self._open = False
 
-    def world(self, scene: Scene, *, parity: bool = True, **options: Any) -> TapedWorld:
+    def world(self, scene: Scene, **options: Any) -> TapedWorld:
         """A freshly loaded world, in place of the one before; arguments and errors as `episode`."""
         case = self.case
         if self._process is None or not self._process.alive:
@@ -90,7 +88,7 @@ class SimulatorHandle:
                 raise DisplayLost(str(error), where) from None
         self._process.deadline = time.monotonic() + (case.timeout or EPISODE_TIMEOUT)
         self.constructed = self._process.construct(case.base, case.changes, gui=case.mode == "gui")
-        return TapedWorld(self._process, scene, parity=parity, **options)
+        return TapedWorld(self._process, scene, **options)
 
     def _keep_example(self, error: Exception, scene: Scene, tape: list[Any]) -> None:
         """Write the failing episode to the run folder."""

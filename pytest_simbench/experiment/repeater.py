@@ -36,9 +36,7 @@ class Repeater:
     """Runs repetitions of an experiment and hands each record over as it is made.
 
     Attributes:
-        experiment: what is repeated.
         executor: where and how many side by side.
-        progress: the live line.
         keep: takes every record at once, before anything else can go wrong.
         begin: is called before the first progress.
         resumed: the interrupted run that is completed, if one is.

@@ -85,7 +85,6 @@ class Repetition:
         experiment: the task, the simulator and its settings.
         number: of the repetition, from 1; 0 starts and ends the simulator alone.
         idle: where workers come from and go to, if the case reuses them.
-        hooks: what is told of it.
         slot: what it waits for before it begins; None: nothing.
         camera: takes pictures by the engine's own renderer, see there; default: one for the film
             that the case asks for of every repetition.

@@ -58,8 +58,6 @@ class SequentialResultSet(ResultSet):
 
     Args:
         records: of the first look.
-        metrics: of the task.
-        plan: when to look.
         more: runs repetitions until there are so many; gives all records.
     """
 

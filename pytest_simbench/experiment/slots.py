@@ -113,7 +113,6 @@ def slot(
     """Wait for a slot, and hold it in this block.
 
     Args:
-        address: of the slots.
         test: whose repetition asks for it.
         stop: whether to wait no longer.
         later: after all that are asked for without it.

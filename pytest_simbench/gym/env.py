@@ -47,8 +47,6 @@ class TaskEnv(gymnasium.Env[Any, Any]):
 
     Args:
         task: its policy is not asked.
-        case: simulator and settings.
-        rhythm: of the steps.
         actions, reward, render_mode: see `making.make`.
     """
 

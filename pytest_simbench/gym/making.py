@@ -49,11 +49,9 @@ def make(
 
     Args:
         task: a name of `TASKS`, or a task of a goal; its policy is not asked.
-        simulator: by its name.
         num_envs: None; or so many at once, as a `gymnasium.vector.VectorEnv`.
         actions: `tool`: it moves along x, y, z and turns about the vertical; `joints`: they move.
         reward: `dense`: minus the distance [m]; `sparse`: 0 at the goal, else -1.
-        profile: of the simulator's settings.
         jitter: scale of the start jitter; 1 is 1 mm and 1 degree.
         robot: a name, a robot file, or a robot; default: the task's own.
         render_mode: `rgb_array`: each step also takes a picture.

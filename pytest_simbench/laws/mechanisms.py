@@ -125,7 +125,7 @@ def mechanism(
     text = f'<robot name="{name}">\n' + "\n".join([*links, *joints]) + "\n</robot>\n"
     return Robot(
         name=name,
-        urdf=str(keep(text, {})),
+        urdf=str(keep(text)),
         packages={},
         srdf="",
         joints=tuple(part.drive for part in parts),

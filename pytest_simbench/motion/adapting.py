@@ -1,22 +1,23 @@
 """What is changed in a robot's URDF before tasks use it, because its TOML file says so; and a hand,
 cut out of its own description, mounted on an arm.
 
-The functions that adapt change the root element that they are given. What is wrong with a name is
-told by the reader of the file; what is wrong with the URDF itself, by `Description`, which looks
-afterwards."""
+The functions that take a root element change it. What is wrong with a name is told by the reader
+of the file; what is wrong with the URDF itself, by `Description`, which looks afterwards."""
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
 from pytest_simbench.description.links import joint_motion
+from pytest_simbench.description.robot_files import content_of, keep
 from pytest_simbench.description.urdf import numbers, pose_of_rpy, write_origin
 from pytest_simbench.description.urdf_check import FIXED, MOVING
-from pytest_simbench.scene import Pose, Vector3
+from pytest_simbench.scene import Pose, Robot, Vector3
 from pytest_simbench.simulator import DescriptionError
 
 TURNS = 2 * math.pi
@@ -83,27 +84,6 @@ def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
         write_origin(joint, origin * moved)
 
 
-def add_tool(
-    robot: ET.Element, link: str, pose: Pose, name: str = TOOL_LINK, joint_name: str = TOOL_JOINT
-) -> None:
-    """Add a link without mass at the tool centre point, which is at a pose in another link.
-
-    Raises:
-        DescriptionError: there is no such link, or one with the new link's name.
-    """
-    names = [element.get("name", "") for element in robot.findall("link")]
-    if link not in names:
-        raise DescriptionError(
-            f"the tool frame {link!r} is no link; choose from {', '.join(names)}"
-        )
-    if name in names:
-        raise DescriptionError(
-            f"there is a link {name!r} already; name it as tool_frame, without xyz and rpy"
-        )
-    ET.SubElement(robot, "link", name=name)
-    robot.append(_fixed(joint_name, link, name, pose))
-
-
 def _fixed(name: str, parent: str, child: str, pose: Pose) -> ET.Element:
     """A joint that holds one link at a pose in another."""
     joint = ET.Element("joint", name=name, type=FIXED)
@@ -125,24 +105,52 @@ def _numbers(joint: ET.Element, tag: str, key: str, default: str) -> Vector3:
         ) from None
 
 
+def with_tool(
+    robot: Robot, pose: Pose, name: str = TOOL_LINK, joint_name: str = TOOL_JOINT
+) -> Robot:
+    """The robot with a new link, without mass, at the tool centre point, which is at a pose in the
+    link that was its tool frame.
+
+    Raises:
+        DescriptionError: there is no such link, or one with the new link's name.
+    """
+    kept, link = content_of(robot), robot.tool_frame
+    urdf = ET.fromstring(kept["urdf"])
+    names = [element.get("name", "") for element in urdf.findall("link")]
+    if link not in names:
+        raise DescriptionError(
+            f"the tool frame {link!r} is no link; choose from {', '.join(names)}"
+        )
+    if name in names:
+        raise DescriptionError(
+            f"there is a link {name!r} already; name it as tool_frame, without xyz and rpy"
+        )
+    ET.SubElement(urdf, "link", name=name)
+    urdf.append(_fixed(joint_name, link, name, pose))
+    path = keep(urdf, kept["meshes"])
+    return replace(robot, urdf=str(path), packages={}, tool_frame=name)
+
+
 MOUNT_JOINT = "mount_of_the_hand"
 
 
 def mounted(
-    arm: ET.Element, hand: ET.Element, root: str, mount: str, pose: Pose, joint: str = MOUNT_JOINT
-) -> ET.Element:
-    """The URDF of an arm with a hand, or with a thing beside it.
+    robot: Robot, other: Robot, root: str, mount: str, pose: Pose, joint: str = MOUNT_JOINT
+) -> Robot:
+    """An arm whose description has a hand, or a thing beside it; its joints are left as they are.
 
     Args:
-        hand: a URDF with the hand in it.
-        root: link of `hand` with which the hand begins; what hangs on it is the hand.
-        mount: link of `arm` that carries it.
+        other: a robot with the hand in it.
+        root: link of `other` with which the hand begins; what hangs on it is the hand.
+        mount: link of the arm that carries it.
         pose: of `root` in `mount`.
         joint: name of the joint that holds it there.
 
     Raises:
         DescriptionError: no such link, or a name that both have.
     """
+    kept, added = content_of(robot), content_of(other)
+    arm, hand = (ET.fromstring(content["urdf"]) for content in (kept, added))
     names = [link.get("name", "") for link in arm.findall("link")]
     if mount not in names:
         raise DescriptionError(
@@ -160,7 +168,8 @@ def mounted(
             )
     whole = ET.Element("robot", arm.attrib)
     whole.extend([*arm, *parts, _fixed(joint, mount, root, pose)])
-    return whole
+    path = keep(whole, {**kept["meshes"], **added["meshes"]})
+    return replace(robot, urdf=str(path), packages={})
 
 
 def _below(xml: ET.Element, root: str) -> set[str]:

@@ -7,12 +7,10 @@ be asked of it: parity, state, drives, friction of joints, pictures.
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import combinations
 
 from pytest_simbench.description.links import joined
-from pytest_simbench.description.robot_files import content_of, keep
 from pytest_simbench.description.urdf import ROOT, PreparedRobot
 from pytest_simbench.description.urdf_check import Description
 from pytest_simbench.motion.adapting import mounted
@@ -45,18 +43,10 @@ def with_thing(scene: Scene, thing: Robot) -> Scene:
             f"{thing.urdf}: the arm would pass through what is fixed of {thing.name!r}; leave its "
             "shapes out, and give them to the scene as fixed bodies"
         )
-    kept, other = content_of(arm), content_of(thing)
-    roots = [Description(robot.urdf, robot.packages).root for robot in (arm, thing)]
-    place = arm.base.inverse() * thing.base
-    urdf = mounted(
-        ET.fromstring(kept["urdf"]), ET.fromstring(other["urdf"]), roots[1], roots[0], place, STAND
-    )
-    path = keep(ET.tostring(urdf, encoding="unicode"), {**kept["meshes"], **other["meshes"]})
+    mount, root = (Description(robot.urdf, robot.packages).root for robot in (arm, thing))
     both = replace(
-        arm,
+        mounted(arm, thing, root, mount, arm.base.inverse() * thing.base, STAND),
         name=f"{arm.name}_and_{thing.name}",
-        urdf=str(path),
-        packages={},
         joints=(*arm.joints, *thing.joints),
         closures=(*arm.closures, *thing.closures),
         couplings=(*arm.couplings, *thing.couplings),

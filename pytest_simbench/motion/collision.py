@@ -5,7 +5,6 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from itertools import product
 
 import coal
 import numpy as np
@@ -15,8 +14,10 @@ from scipy.spatial import ConvexHull
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.robot_files import description_xml
 from pytest_simbench.description.urdf import PreparedRobot
+from pytest_simbench.motion.hulls import outward_faces
 from pytest_simbench.motion.model import RobotModel, last_change
 from pytest_simbench.scene import Body, FloatArray, Pose, Robot, Scene
+from pytest_simbench.scene.overlap import box_corners
 
 MARGIN = 0.012
 """Distance kept from obstacles in free motions [m]; straight approaches may touch. In a scene of
@@ -106,7 +107,7 @@ class PlanningScene:
         self._prepared: PreparedRobot | None = None
         if not self.model.robot.beside:
             return
-        self._prepared = prepared = PreparedRobot(self.model.robot)
+        self._prepared = prepared = _prepared(self.model.robot, last_change(self.model.robot))
         for index in self._links:
             shape = geometry.geometryObjects[index]
             frame = self.model.pin.frames[shape.parentFrame]
@@ -120,8 +121,7 @@ class PlanningScene:
         what is beside the arm."""
         inverse = self.model.base.inverse()
         if self._prepared and joints is not None:
-            names = self.model.robot.joint_names
-            placed = link_poses(self._prepared, dict(zip(names, joints.tolist(), strict=True)))
+            placed = link_poses(self._prepared, joints)
             for link, shapes in self._things.items():
                 for index, within in shapes.items():
                     at = inverse * pin.SE3(placed[link].matrix()) * within
@@ -237,6 +237,12 @@ class PlanningScene:
 
 
 @lru_cache(maxsize=64)
+def _prepared(robot: Robot, changed: tuple[int, ...]) -> PreparedRobot:
+    """The reduced robot, read once: each repetition asks for it."""
+    return PreparedRobot(robot)
+
+
+@lru_cache(maxsize=64)
 def _links(robot: Robot, changed: tuple[int, ...]) -> pin.GeometryModel:
     """The shapes of a robot's links and the pairs to check, made once: each repetition asks for it.
     Its files are sound."""
@@ -264,10 +270,8 @@ def convex_hull(points: FloatArray) -> coal.Convex:
     corners, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for corner in points[hull.vertices]:
         corners.append(corner)
-    for face, outward in zip(hull.simplices, hull.equations[:, :3], strict=True):
-        a, b, c = points[face]
-        turned = np.cross(b - a, c - a) @ outward < 0.0
-        faces.append(coal.Triangle(*map(int, number[face[::-1] if turned else face])))
+    for face in number[outward_faces(hull)].tolist():
+        faces.append(coal.Triangle(*face))
     return coal.Convex(corners, faces)
 
 
@@ -275,7 +279,7 @@ def _below(placement: pin.SE3, shape: coal.CollisionGeometry, above: float) -> F
     """Corners of the part of a convex shape that lies at most so far above the tool centre point,
     in the tool frame, whose z points down; (n, 3)."""
     if isinstance(shape, coal.Box):
-        corners = np.array(list(product((-1, 1), repeat=3))) * shape.halfSide
+        corners = box_corners(2 * shape.halfSide)
     else:
         corners = np.asarray(shape.points())
     corners = corners @ placement.rotation.T + placement.translation

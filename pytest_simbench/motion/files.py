@@ -16,19 +16,18 @@ from typing import NamedTuple
 import numpy as np
 
 from pytest_simbench.description.mesh_check import PACKAGE
-from pytest_simbench.description.robot_files import content, content_of, description_xml, keep
+from pytest_simbench.description.robot_files import content, description_xml, keep
 from pytest_simbench.description.urdf import pose_of_rpy
 from pytest_simbench.description.urdf_check import MOVING, Description, read_xml
 from pytest_simbench.ground.files import FileError, read_file
 from pytest_simbench.motion import panda
 from pytest_simbench.motion.adapting import (
-    TOOL_LINK,
-    add_tool,
     bound_joints,
     free_frames,
     lock_joints,
     mounted,
     pairs_not_checked,
+    with_tool,
 )
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import RobotError
@@ -92,10 +91,10 @@ class _Reader:
         if not re.fullmatch(r"[A-Za-z0-9_-]{1,40}", self.name) or self.name in ("all", "none"):
             raise table.error("name", "use up to 40 letters, digits, _ and - (not all, not none)")
         self.packages = {panda.DISTRIBUTION: str(panda.description_folder())}
-        for name, place in table.names("packages").items():
+        for name, place in table.every("packages", FileTable.text).items():
             self.packages[name] = str(folder / place)
         self.urdf = self._path(table.text("urdf"))
-        self._locked, self._changed = table.numbers("locked"), False
+        self._locked, self._changed = table.every("locked", FileTable.number), False
         description = Description(self.urdf, self.packages, self._adapt)
         self.moving = _moving(description.joints)
         corners = table.number("hull_corners", 0.0, least=0.0)
@@ -151,7 +150,7 @@ class _Reader:
     def _cuts(self, description: Description, hulls: bool) -> dict[str, Cuts]:
         """Where the meshes of links are cut, by link."""
         found, links = {}, description.links
-        for name, table in self.table.tables("cut").items():
+        for name, table in self.table.every("cut", FileTable.table).items():
             if not hulls:
                 raise self.table.error("cut", "give hull_corners too: each slice becomes a hull")
             if name not in links:
@@ -271,24 +270,13 @@ def _with_files(robot: Robot, hand: _Hand, srdf: str | None) -> Robot:
     """The robot with its hand mounted, and a list of the link pairs that are not checked."""
     lists = [read_xml(srdf, "the list of link pairs")] if srdf else []
     if hand.tool is not None:
-        kept = content_of(robot)
-        urdf = ET.fromstring(kept["urdf"])
-        add_tool(urdf, robot.tool_frame, hand.tool)
-        path = keep(ET.tostring(urdf, encoding="unicode"), kept["meshes"])
-        robot = replace(robot, urdf=str(path), packages={}, tool_frame=TOOL_LINK)
-    elif hand.mount is None:
-        urdf = description_xml(robot)
-    else:
+        robot = with_tool(robot, hand.tool)
+    elif hand.mount is not None:
         whole = panda.panda()
-        arm, other = content_of(robot), content_of(whole)
-        urdf = mounted(
-            ET.fromstring(arm["urdf"]), ET.fromstring(other["urdf"]), panda.HAND, *hand.mount
-        )
+        robot = mounted(robot, whole, panda.HAND, *hand.mount)
         lists.append(read_xml(whole.srdf, "the list of link pairs"))
-        path = keep(ET.tostring(urdf, encoding="unicode"), {**arm["meshes"], **other["meshes"]})
-        robot = replace(robot, urdf=str(path), packages={})
-    pairs = ET.tostring(pairs_not_checked(urdf, lists), encoding="unicode")
-    return replace(robot, srdf=str(keep(pairs, {}, ".srdf")))
+    pairs = pairs_not_checked(description_xml(robot), lists)
+    return replace(robot, srdf=str(keep(pairs, ending=".srdf")))
 
 
 def _standing(robot: Robot) -> Robot:

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pytest_simbench.description.robot_files import content_of, keep
-from pytest_simbench.motion.adapting import add_tool
+from pytest_simbench.description.robot_files import content_of
+from pytest_simbench.motion.adapting import with_tool
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError, Unreachable
 from pytest_simbench.motion.kinematics import inverse_kinematics
@@ -51,7 +51,9 @@ def grasp_of(robot: Robot, width: float, scale: float) -> Grasp:
     """How a robot of `grasping`, or one with parallel fingers, grasps a cube of that width [m]."""
     if robot.tool_frame != GRASP_LINK:
         return Grasp(width / 2)
-    return Grasp(_jaw_at(robot, width), CLEARANCE * scale)
+    touching = _opening(robot, width / 2, width / 2)  # the tool centre point is in its middle
+    assert touching is not None  # it opens wider
+    return Grasp(touching, CLEARANCE * scale)
 
 
 def grasping(robot: Robot, width: float, scale: float, wide: bool = False) -> Robot:
@@ -66,43 +68,33 @@ def grasping(robot: Robot, width: float, scale: float, wide: bool = False) -> Ro
     model = RobotModel(robot)
     if not model.has_one_jaw:
         return robot
-    path, opened = _adapted(robot, width, width + 2 * CLEARANCE * scale)
+    opened = _opening(robot, width + 2 * CLEARANCE * scale, width / 2)
     if opened is None:
         return robot
     if wide:
         opened = robot.gripper.opened
     joints = (*robot.joints[:-1], replace(robot.joints[-1], initial_position=opened))
     gripper = replace(robot.gripper, opened=opened)
+    path = _adapted(robot, width)
     return replace(
         robot, urdf=path, packages={}, tool_frame=GRASP_LINK, joints=joints, gripper=gripper
     )
 
 
 @cache
-def _adapted(robot: Robot, width: float, gap: float) -> tuple[str, float | None]:
-    """The description with the new tool centre point, and the jaw's position at that gap [rad]."""
-    kept = content_of(robot)
-    urdf = ET.fromstring(kept["urdf"])
-    add_tool(urdf, robot.tool_frame, Pose.at(0.0, width / 2, 0.0), GRASP_LINK, GRASP_JOINT)
-    path = keep(ET.tostring(urdf, encoding="unicode"), kept["meshes"])
-    return str(path), _opening(robot, gap, width / 2)
+def _adapted(robot: Robot, width: float) -> str:
+    """The path of the description with the new tool centre point."""
+    return with_tool(robot, Pose.at(0.0, width / 2, 0.0), GRASP_LINK, GRASP_JOINT).urdf
 
 
 def width_of_jaw(robot: Robot) -> float:
     """Of the cubes that a robot of `grasping` was made for [m]."""
     origin = ET.fromstring(content_of(robot)["urdf"]).find(f"joint[@name='{GRASP_JOINT}']/origin")
-    assert origin is not None  # `add_tool` wrote it
+    assert origin is not None  # `with_tool` wrote it
     return 2 * float(origin.get("xyz", "").split()[1])
 
 
 @cache
-def _jaw_at(robot: Robot, width: float) -> float:
-    """Where the jaw of a robot of `grasping` touches a cube [rad]."""
-    found = _opening(robot, width / 2, width / 2)  # the tool centre point is in its middle
-    assert found is not None  # it opens wider
-    return found
-
-
 def _opening(robot: Robot, gap: float, above: float) -> float | None:
     """Position of the jaw at which it stands so far from y = 0 of the tool frame [rad]; None where
     it cannot."""

@@ -15,10 +15,12 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from pytest_simbench.description.mesh_check import read_stl, written_stl
 from pytest_simbench.description.robot_files import digest
+from pytest_simbench.description.shapes import directions
 from pytest_simbench.description.urdf import origin_of
 from pytest_simbench.scene import FloatArray
 
@@ -98,19 +100,19 @@ def extreme(points: FloatArray, count: int) -> FloatArray:
 
     Their hull lies in that of all points. On a ball of radius r it stands back by some 4 r / count.
     """
-    height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
-    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)  # a Fibonacci lattice
-    flat = np.sqrt(1.0 - height**2)
-    directions = np.stack([flat * np.cos(turn), flat * np.sin(turn), height])
-    return np.unique(np.argmax(points @ directions, axis=0))
+    return np.unique(np.argmax(points @ directions(count).T, axis=0))
 
 
 def stl(points: FloatArray) -> bytes:
     """The convex hull of points, (n, 3), as a binary STL, its faces turned outwards."""
     hull = ConvexHull(points)
-    corners = hull.points[hull.simplices]
-    normals = hull.equations[:, :3]
-    a, b, c = corners.transpose(1, 0, 2)
-    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), normals) < 0
-    corners[inwards] = corners[inwards][:, ::-1]
-    return written_stl(corners, normals)
+    return written_stl(hull.points[outward_faces(hull)], hull.equations[:, :3])
+
+
+def outward_faces(hull: ConvexHull) -> NDArray[np.intp]:
+    """Numbers of the points of its triangles, counter-clockwise from outside, (n, 3)."""
+    faces = np.array(hull.simplices, dtype=int)
+    a, b, c = hull.points[faces].transpose(1, 0, 2)
+    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inwards] = faces[inwards][:, ::-1]
+    return faces

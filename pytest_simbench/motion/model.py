@@ -109,8 +109,7 @@ class RobotModel:
         """Pose of the tool centre point in the world."""
         transform = self.tool_transform(arm)
         x, y, z, w = pin.Quaternion(transform.rotation).coeffs()
-        px, py, pz = transform.translation
-        return Pose((float(px), float(py), float(pz)), (float(w), float(x), float(y), float(z)))
+        return Pose.from_array([*transform.translation, w, x, y, z])
 
     def tool_jacobian(self, arm: FloatArray) -> FloatArray:
         """Jacobian of the tool, its own axes, rows linear then angular, (6, arm)."""

@@ -17,18 +17,12 @@ import numpy as np
 from ompl import base, geometric, util
 
 from pytest_simbench.motion.collision import PlanningScene
-from pytest_simbench.motion.errors import InCollision, NoPath, PlanningError
+from pytest_simbench.motion.errors import InCollision, NoPath
 from pytest_simbench.motion.kinematics import straight_line, tool_path
 from pytest_simbench.motion.model import RobotModel
-from pytest_simbench.motion.throw import (
-    Throw,
-    feasible_swing,
-    released,
-)
+from pytest_simbench.motion.throw import Throw, feasible_swing, released
 from pytest_simbench.motion.timing import TICK, Timed, along_path, straight_move, synchronised_move
 from pytest_simbench.scene import FloatArray, Pose, Trajectory
-
-__all__ = ["MotionPlanner", "PlanningError"]
 
 CHECK_SPACING = 0.02
 """Farthest that the hand moves between two collision checks [m]. The planning scene's margin is

@@ -45,19 +45,8 @@ class FileTable:
             raise self.error(key, "name each once")
         return tuple(value)
 
-    def names(self, key: str) -> dict[str, str]:
-        """A table of texts."""
-        return self._each(key, FileTable.text)
-
-    def numbers(self, key: str) -> dict[str, float]:
-        """A table of numbers."""
-        return self._each(key, FileTable.number)
-
-    def tables(self, key: str) -> dict[str, FileTable]:
-        """A table of tables."""
-        return self._each(key, FileTable.table)
-
-    def _each(self, key: str, read: Callable[[FileTable, str], T]) -> dict[str, T]:
+    def every(self, key: str, read: Callable[[FileTable, str], T]) -> dict[str, T]:
+        """A table whose values are all of one kind: `every("locked", FileTable.number)`."""
         inner = self.table(key)
         return {name: read(inner, name) for name in list(inner._left)}
 

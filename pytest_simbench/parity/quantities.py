@@ -148,7 +148,7 @@ def _robot_quantities(robot: Robot, prepared: PreparedRobot) -> dict[str, Any]:
         quantities |= named(f"closure/{k}", points=points, rigid=float(closure.rigid))
     for pair in robot.couplings:
         quantities[f"coupling/{pair.follower}"] = np.array([pair.ratio, pair.offset])
-    poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
+    poses = link_poses(prepared)
     for link in prepared.links.values():
         prefix = f"link/{link.name}"
         quantities[f"{prefix}/pose"] = poses[link.name].as_array()

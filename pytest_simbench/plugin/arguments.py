@@ -24,7 +24,8 @@ failing = partial(refusing, kind=_failure)
 """Fails the test in place of errors in a block, with their sentences alone."""
 
 
-def _refuse(sentence: str) -> NoReturn:
+def refuse(sentence: str) -> NoReturn:
+    """Fail the test with this sentence alone."""
     raise _failure(sentence)
 
 
@@ -46,21 +47,10 @@ def can_do(experiment: Experiment, skips: bool) -> Experiment:
     if skips and problem:
         pytest.skip(f"--robot=all: {problem}")
     if problem:
-        _refuse(f"--robot: {problem}")
+        refuse(f"--robot: {problem}")
     if skips and experiment.case.robot is not None and experiment.robot is None:
         pytest.skip(f"--robot=all: the task {experiment.task.name!r} has no robot, and ran once")
     return experiment
-
-
-def refuse_second(task: Task, done: list[Task]) -> None:
-    """Fail a test that repeats a task twice: the repetitions could not be told apart. The same task
-    with other parameters is another one."""
-    if task in done:
-        _refuse(
-            f"repeat() is called for the task {task.name!r} a second time in one test, and its "
-            "repetitions could not be told apart: write a second test, or parametrize this one"
-        )
-    done.append(task)
 
 
 def checked_settings(value: Any, of: Variant, chosen: Selection) -> dict[str, Any]:
@@ -68,7 +58,7 @@ def checked_settings(value: Any, of: Variant, chosen: Selection) -> dict[str, An
     from pytest_simbench.ground.errors import SettingsError
 
     if not isinstance(value, Mapping):
-        _refuse(
+        refuse(
             f"the fixture sim_settings gives {shown(repr(value))}; it must give a dict of settings "
             "by name, {'timestep': 0.001} for instance"
         )
@@ -80,7 +70,7 @@ def checked_settings(value: Any, of: Variant, chosen: Selection) -> dict[str, An
 def checked_threshold(metric: Any, default: Any) -> float:
     """The suite's own threshold of a metric, if both are what they must be; else the test fails."""
     if not isinstance(metric, str) or not metric:
-        _refuse(f"threshold({shown(repr(metric))}, ...) takes the name of a metric as a text")
+        refuse(f"threshold({shown(repr(metric))}, ...) takes the name of a metric as a text")
     with suppress(BadValue):
         return float(ANY_NUMBER.check(default))
-    _refuse(f"threshold({metric!r}, {shown(repr(default))}) takes a finite number")
+    refuse(f"threshold({metric!r}, {shown(repr(default))}) takes a finite number")

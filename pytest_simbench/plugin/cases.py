@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from pytest_simbench.cli.values import refusing
 from pytest_simbench.plugin import arguments, cluster, options, recording
 from pytest_simbench.plugin.session import session_of
 
@@ -69,10 +70,8 @@ def _display(this: Run) -> Displays:
     """The displays of a run, if there are any; skips the test where there are none."""
     from pytest_simbench.client.errors import DisplayError
 
-    try:
+    with refusing(DisplayError, kind=pytest.skip.Exception):
         this.displays.environment()
-    except DisplayError as error:
-        pytest.skip(str(error))
     return this.displays
 
 

@@ -22,7 +22,8 @@ from pytest_simbench.records.baseline import (
 )
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric, UnknownMetric
-from pytest_simbench.report.markdown.run import render_changes as render_markdown
+from pytest_simbench.report.markdown.run import render_section
+from pytest_simbench.report.model import changes
 from pytest_simbench.report.terminal.parts import render_changes as render_terminal
 
 Beside = tuple[str, Sequence[str]]
@@ -78,7 +79,8 @@ class Comparison:
         """For the page of a CI job."""
         if self._report is None:
             return ""
-        return render_markdown(self._report, self.baseline.name, bool(self.limits))
+        told = changes.section(self.baseline.name, self._report, bool(self.limits))
+        return render_section(told) + "\n"
 
 
 def prepare(

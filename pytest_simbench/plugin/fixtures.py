@@ -119,14 +119,8 @@ def repeat(
     run = session_of(request.config).run
     run.expected = partial(expected, request.session)
     repeat = RepeatFixture(request.node, simbench_case, run)
-    done: list[Task] = []
-
-    def perform(task: Task) -> ResultSet:
-        arguments.refuse_second(arguments.checked_task(task, "repeat"), done)
-        return repeat(task)
-
     request.node.stash[REPEATED] = repeat.check_crashes
-    yield perform
+    yield repeat
     repeat.finish(simbench_rounds)
 
 

@@ -1,5 +1,5 @@
-"""pytest's hooks, but for those of `SimSession`. Loaded in every pytest run where the package is
-installed, so it stays light."""
+"""pytest's hooks before there is a `SimSession`, which has the others, and of each test. Loaded in
+every pytest run where the package is installed, so it stays light."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.plugin import inputs, old_options, options, registration, sanitise
-from pytest_simbench.plugin.session import REPEATED, fixtures_of, session_of
+from pytest_simbench.plugin import inputs, old_options, registration, sanitise
+from pytest_simbench.plugin.session import REPEATED, session_of
 
 MARKS = (
     "only_sim(*names): run only on these simulators",
@@ -64,37 +64,9 @@ def pytest_configure(config: pytest.Config) -> None:
         inputs.run_suite(config)
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_benchmark_compare_machine_info(config: pytest.Config, compared_benchmark: Any) -> None:
-    """Keep the saved run that `--benchmark-compare` chose; of several, the newest comes last."""
-    session_of(config).saved.append(compared_benchmark)
-
-
 def pytest_cmdline_main(config: pytest.Config) -> int | None:
     old = old_options.asked(config)
     return None if old is None else old_options.run_command(config, old)
-
-
-def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    if "sim_case" in metafunc.fixturenames:
-        session_of(metafunc.config).parametrize(metafunc)
-    elif metafunc.definition.get_closest_marker("sim_conformance"):
-        session_of(metafunc.config).parametrize_conformance(metafunc)
-    elif "simbench_robot" in metafunc.fixturenames:
-        session_of(metafunc.config).parametrize_robot(metafunc)
-    if "policy" in metafunc.fixturenames and metafunc.definition.get_closest_marker("policies"):
-        session_of(metafunc.config).parametrize_policy(metafunc)
-
-
-@pytest.hookimpl(tryfirst=True)  # before -k and -m leave out tests
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    session_of(config).check_collected(items)
-
-
-def pytest_report_collectionfinish(config: pytest.Config, items: list[pytest.Item]) -> list[str]:
-    """Which of our options go by another name here, where there are tests of simulators."""
-    ours = any("sim_case" in fixtures_of(item) for item in items)
-    return options.taken_names(config) if ours else []
 
 
 @pytest.hookimpl(wrapper=True)
@@ -115,24 +87,3 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     found = yield from pytest_runtest_setup()
     item.stash.get(REPEATED, lambda: None)()
     return found
-
-
-@pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    ours = session_of(session.config)
-    with ours.interruptible():
-        ours.finish(session)
-
-
-@pytest.hookimpl(optionalhook=True, wrapper=True)
-def pytest_benchmark_group_stats(config: pytest.Config) -> Generator[None, Any, Any]:
-    """Leave our benchmarks out of pytest-benchmark's table unless one of its options is given."""
-    from pytest_simbench.plugin.benchmark import shown
-
-    return shown(config, (yield))
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, exitstatus: int) -> None:
-    ours = session_of(terminalreporter.config)
-    with ours.interruptible():
-        ours.summarise(terminalreporter, exitstatus)

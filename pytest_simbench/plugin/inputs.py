@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -135,13 +136,10 @@ class SceneFiles:
         return scene
 
 
-@contextmanager
-def _ending() -> Iterator[None]:
+def _ending() -> AbstractContextManager[None]:
     """A file that cannot be used ends the run with one sentence."""
     from pytest_simbench.scene import SceneError
     from pytest_simbench.simulator import SimulatorError
 
-    try:
-        yield
-    except (SimulatorError, SceneError) as error:
-        pytest.exit(str(error), returncode=pytest.ExitCode.USAGE_ERROR)
+    ends = partial(pytest.exit.Exception, returncode=pytest.ExitCode.USAGE_ERROR)
+    return refusing((SimulatorError, SceneError), kind=ends)

@@ -20,7 +20,7 @@ from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.verdicts import Judgement
 from pytest_simbench.measure.verdicts import Verdict as DataVerdict
 from pytest_simbench.plugin import options, recording
-from pytest_simbench.plugin.arguments import can_do, failing
+from pytest_simbench.plugin.arguments import can_do, checked_task, failing, refuse
 from pytest_simbench.plugin.benchmark import give_rounds
 from pytest_simbench.plugin.marks import number_mark
 from pytest_simbench.plugin.run import Run
@@ -43,11 +43,22 @@ class RepeatFixture:
         self.node = node
         self.case = case
         self.run = run
+        self.tasks: list[Task] = []
         self.results: list[ResultSet] = []
         self.described: dict[str, TaskDescription] = {}
 
     def __call__(self, task: Task) -> ResultSet:
-        """Run a task's repetitions, as many as options and marks say."""
+        """Run a task's repetitions, as many as options and marks say.
+
+        A task that was repeated before fails the test: the repetitions could not be told apart.
+        The same task with other parameters is another one.
+        """
+        if checked_task(task, "repeat") in self.tasks:
+            refuse(
+                f"repeat() is called for the task {task.name!r} a second time in one test, and its "
+                "repetitions could not be told apart: write a second test, or parametrize this one"
+            )
+        self.tasks.append(task)
         wanted = options.value(self.node.config, "sim_reps")
         skips = session_of(self.node.config).selection.every_robot
         experiment = can_do(Experiment(self.case, task), skips)

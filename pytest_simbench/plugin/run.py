@@ -20,13 +20,12 @@ from pytest_simbench.client.display import Displays
 from pytest_simbench.cluster.executor import ClusterExecutor
 from pytest_simbench.experiment.executor import Executor, LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.resumed import Resumed
+from pytest_simbench.experiment.resumed import NotResumed, Resumed, run_to_resume
 from pytest_simbench.experiment.slots import Slots
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.plugin import cluster, options, recording, thresholds
 from pytest_simbench.plugin.compare import Comparison
 from pytest_simbench.plugin.history import folder_of, on_other_machines
-from pytest_simbench.plugin.resume import folder_to_resume
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import Threshold
 from pytest_simbench.records.folder import RunContents, RunFolder
@@ -75,18 +74,32 @@ class Run:
                 self.resumed = Resumed(self.folder)
 
     def _choose_path(self) -> Path:
+        """Of the folder.
+
+        Raises:
+            pytest.UsageError: there is no run to resume, or it lies elsewhere than the output.
+        """
         if self._shared_by is not None and "simbench_folder" in self._shared_by:
             return Path(self._shared_by["simbench_folder"])
-        if (resumed := folder_to_resume(self.config)) is not None:
-            return resumed
-        given = options.value(self.config, "sim_output")
-        if given:
-            return Path(self.config.invocation_params.dir, given)
-        history = options.value(self.config, "sim_history")
+        config, here = self.config, self.config.invocation_params.dir
+        output, resume = (options.value(config, f"sim_{name}") for name in ("output", "resume"))
+        if resume is not None:
+            given = "" if resume is True else resume  # the option without a value
+            if given and output and given != output:
+                raise pytest.UsageError(
+                    f"--sim-resume {given} and --sim-output {output}: a run is completed in its "
+                    "own folder, so leave out --sim-output"
+                )
+            folder = Path(here, given or output) if given or output else None
+            with options.refusing(NotResumed):
+                return run_to_resume(folder, config.rootpath / RUNS)
+        if output:
+            return Path(here, output)
+        history = options.value(config, "sim_history")
         if history is not None:
-            self.tell(on_other_machines(self.config, history.name))
-            return folder_of(self.config, history.name)
-        return new_name(self.config.rootpath / RUNS)
+            self.tell(on_other_machines(config, history.name))
+            return folder_of(config, history.name)
+        return new_name(config.rootpath / RUNS)
 
     def lock(self) -> None:
         """Make the folder this run's own; may be called again.

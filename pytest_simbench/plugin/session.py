@@ -20,21 +20,14 @@ if TYPE_CHECKING:
     from pytest_simbench.plugin.compare import Comparison
     from pytest_simbench.plugin.run import Run
 
-NAMING = (
-    "sim_name",
-    "sim_robot",
-    "sim_profile",
-    "sim_set",
-    "sim_python",
-    "sim_spec",
-)
+NAMING = ("sim_name", "sim_robot", "sim_profile", "sim_set", "sim_python", "sim_spec")
 """Options whose values name simulators or robots: they are held against what is registered, which
 takes imports."""
 
 
 class SimSession:
-    """One pytest process, from its options to its summary. Also a plugin: some of
-    pytest's hooks are its own.
+    """One pytest process, from its options to its summary. Also a plugin: most of pytest's hooks
+    are its own.
 
     Attributes:
         config: of the process.
@@ -122,12 +115,35 @@ class SimSession:
             names = self.selection.simulators if named else ()
             self.comparison = prepare(config, self.saved, names)
 
-    def parametrize(self, metafunc: pytest.Metafunc) -> None:
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_benchmark_compare_machine_info(self, compared_benchmark: Any) -> None:
+        """Keep the saved run of `--benchmark-compare`; of several, the newest comes last."""
+        self.saved.append(compared_benchmark)
+
+    def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
+        """Make a test of each simulator and mode, of each law of the conformance kit, of each robot
+        where there are several, and of each policy."""
+        wanted, marked = metafunc.fixturenames, metafunc.definition.get_closest_marker
+        if "sim_case" in wanted:
+            self._parametrize(metafunc)
+        elif kit := marked("sim_conformance"):
+            tests = kit.args[0].tests(self.selection.robots.values())
+            metafunc.parametrize("check", [pytest.param(test, id=test.id) for test in tests])
+        elif "simbench_robot" in wanted and self.selection.every_robot:
+            robots = list(self.selection.robots)
+            ids = [name or "panda" for name in robots]
+            metafunc.parametrize("simbench_robot", robots, ids=ids, indirect=True, scope="session")
+        if "policy" in wanted and marked("policies"):
+            from pytest_simbench.plugin.policies import parametrize
+
+            parametrize(metafunc, self.policies)
+
+    def _parametrize(self, metafunc: pytest.Metafunc) -> None:
         """Make a test of each simulator and mode, as its marks say."""
-        from pytest_simbench.plugin.marks import NOTHING, number_mark, parameters
+        from pytest_simbench.plugin.marks import NOTHING, NUMBERS, number_mark, parameters
 
         try:
-            for name in ("reps", "sim_timeout", "sim_crashes"):
+            for name in NUMBERS:
                 number_mark(metafunc.definition, name)
             chosen = parameters(metafunc, self.selection)
         except pytest.UsageError as error:
@@ -144,42 +160,24 @@ class SimSession:
             ]
         metafunc.parametrize(names, chosen, indirect=True, scope="session")
 
-    def parametrize_robot(self, metafunc: pytest.Metafunc) -> None:
-        """Make a test of each robot, if there are several; it takes no simulator."""
-        robots = self.selection.robots
-        if self.selection.every_robot:
-            ids = [name or "panda" for name in robots]
-            metafunc.parametrize(
-                "simbench_robot", list(robots), ids=ids, indirect=True, scope="session"
-            )
-
-    def parametrize_policy(self, metafunc: pytest.Metafunc) -> None:
-        """Make a test of each policy for its task."""
-        from pytest_simbench.plugin.policies import parametrize
-
-        parametrize(metafunc, self.policies)
-
-    def parametrize_conformance(self, metafunc: pytest.Metafunc) -> None:
-        """Make a test of each law of the conformance kit, with the robots of `--robot`."""
-        mark = metafunc.definition.get_closest_marker("sim_conformance")
-        if mark is not None:
-            tests = mark.args[0].tests(self.selection.robots.values())
-            metafunc.parametrize("check", [pytest.param(test, id=test.id) for test in tests])
-
-    def check_collected(self, items: list[pytest.Item]) -> None:
+    @pytest.hookimpl(tryfirst=True)  # before -k and -m leave out tests
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Complain of marks, and have pytest-benchmark take the workers' seconds."""
         if self.problems:
             raise pytest.UsageError("\n".join(dict.fromkeys(self.problems)))
-        ours = [item for item in items if "sim_case" in fixtures_of(item)]
-        if ours:
+        if ours := [item for item in items if "sim_case" in fixtures_of(item)]:
             from pytest_simbench.plugin.marks import skip_what_parameters_need
 
             skip_what_parameters_need(ours)
-        timed = [item for item in items if "simbench_rounds" in fixtures_of(item)]
-        if timed:
+        if timed := [item for item in items if "simbench_rounds" in fixtures_of(item)]:
             from pytest_simbench.plugin.benchmark import time_by_workers
 
             time_by_workers(self.config.pluginmanager, timed)
+
+    def pytest_report_collectionfinish(self, items: list[pytest.Item]) -> list[str]:
+        """Which of our options go by another name here, where there are tests of simulators."""
+        ours = any("sim_case" in fixtures_of(item) for item in items)
+        return options.taken_names(self.config) if ours else []
 
     def pytest_collection_finish(self, session: pytest.Session) -> None:
         """Complain of a run folder that the ini file names, if a test needs one, before it runs."""
@@ -222,7 +220,7 @@ class SimSession:
             self._passed.add(report.nodeid)
 
     @contextmanager
-    def interruptible(self) -> Iterator[None]:
+    def _interruptible(self) -> Iterator[None]:
         """While results are put together: Ctrl-C ends that with one sentence."""
         try:
             yield
@@ -236,47 +234,62 @@ class SimSession:
                 returncode=pytest.ExitCode.INTERRUPTED,
             )
 
-    def finish(self, session: pytest.Session) -> None:
+    @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Compare with the baseline; a metric that is worse than allowed fails the run, and so do
         a limit that compared nothing and a threshold of a metric that no test has."""
-        if self._received:
-            self.run.receive(self._received)
-        if self.in_worker:
-            return
-        if self.begun:
-            self.run.judge(self._failed, self._passed)
-            self.run.complete()
-        if self.comparison is not None and self._alone:
-            from pytest_simbench.records.folder import RunContents
+        with self._interruptible():
+            if self._received:
+                self.run.receive(self._received)
+            if self.in_worker:
+                return
+            if self.begun:
+                self.run.judge(self._failed, self._passed)
+                self.run.complete()
+            if self.comparison is not None and self._alone:
+                from pytest_simbench.records.folder import RunContents
 
-            reading = self.run.reading if self.begun else RunContents()
-            if reading.records or self.comparison.typed:
-                self.comparison.make(reading)
-            if self.comparison.failed and session.exitstatus == pytest.ExitCode.OK:
-                session.exitstatus = pytest.ExitCode.TESTS_FAILED
-        if self.begun:
-            self.run.check_thresholds(session)
+                reading = self.run.reading if self.begun else RunContents()
+                if reading.records or self.comparison.typed:
+                    self.comparison.make(reading)
+                if self.comparison.failed and session.exitstatus == pytest.ExitCode.OK:
+                    session.exitstatus = pytest.ExitCode.TESTS_FAILED
+            if self.begun:
+                self.run.check_thresholds(session)
 
-    def summarise(self, reporter: pytest.TerminalReporter, exitstatus: int) -> None:
+    @pytest.hookimpl(optionalhook=True, wrapper=True)
+    def pytest_benchmark_group_stats(self) -> Generator[None, Any, Any]:
+        """Leave our benchmarks out of pytest-benchmark's table unless one of its options is
+        given."""
+        from pytest_simbench.plugin.benchmark import shown
+
+        return shown(self.config, (yield))
+
+    @pytest.hookimpl(trylast=True)  # what is printed last is read first
+    def pytest_terminal_summary(
+        self, terminalreporter: pytest.TerminalReporter, exitstatus: int
+    ) -> None:
         """Print the result, write the report, and say last where it is."""
+        reporter = terminalreporter
         if self.in_worker:  # an xdist worker has a reporter too, which nobody reads
             return
-        if self.begun:
-            self.run.summarise(reporter, self.comparison, exitstatus == pytest.ExitCode.OK)
-        if self.comparison:
-            reporter.write_sep("=", "comparison with the baseline")
-            reporter.write_line(self.comparison.text(reporter._tw.fullwidth))
-        if self.begun or self.config.pluginmanager.has_plugin("dsession"):
-            from pytest_simbench.records.repeatability import NAME
+        with self._interruptible():
+            if self.begun:
+                self.run.summarise(reporter, self.comparison, exitstatus == pytest.ExitCode.OK)
+            if self.comparison:
+                reporter.write_sep("=", "comparison with the baseline")
+                reporter.write_line(self.comparison.text(reporter._tw.fullwidth))
+            if self.begun or self.config.pluginmanager.has_plugin("dsession"):
+                from pytest_simbench.records.repeatability import NAME
 
-            if (self.run.folder.path / NAME).is_file():
-                from pytest_simbench.plugin.repeatability import summarise
+                if (self.run.folder.path / NAME).is_file():
+                    from pytest_simbench.plugin.repeatability import summarise
 
-                summarise(reporter, self.run.folder.path)
-        if self.begun and self.run.page is not None:
-            from pytest_simbench.report.files import where
+                    summarise(reporter, self.run.folder.path)
+            if self.begun and self.run.page is not None:
+                from pytest_simbench.report.files import where
 
-            reporter.write_line(where(self.run.page, self.config.invocation_params.dir))
+                reporter.write_line(where(self.run.page, self.config.invocation_params.dir))
 
     def pytest_unconfigure(self) -> None:
         """End what the run started."""

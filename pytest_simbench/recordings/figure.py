@@ -102,7 +102,6 @@ class Figure(Wire):
         """Where the links are in the world: position [m] and quaternion w, x, y, z.
 
         Args:
-            names: of the joints.
             positions: of these joints over time, (n, n_joints) [rad or m].
 
         Returns:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.ground.files import read_arrays
-from pytest_simbench.records.paths import write_whole
+from pytest_simbench.records.paths import whole, write_whole
 
 INSTALL = "videos need PyAV: pip install 'pytest-simbench[video]'"
 
@@ -183,12 +183,11 @@ class Album:
         Raises:
             OSError: it cannot be written.
         """
-        file = io.BytesIO()
         names = np.array(list(self.pictures), dtype=np.str_)
         taken = {f"picture_{k}": picture for k, picture in enumerate(self.pictures.values())}
         times = np.array([self.times[name] for name in self.pictures], dtype=float)
-        np.savez_compressed(file, phases=names, times=times, **taken)  # type: ignore[arg-type]
-        write_whole(folder, name, file.getvalue())
+        with whole(folder, name) as file:
+            np.savez_compressed(file, phases=names, times=times, **taken)  # type: ignore[arg-type]
 
     @classmethod
     def read(cls, path: Path) -> Album:

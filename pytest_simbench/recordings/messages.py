@@ -27,11 +27,7 @@ NO_CORNERS = np.zeros((0, 3))
 
 
 class Messages:
-    """Makes messages; their definitions are those of ROS 2 Jazzy.
-
-    Attributes:
-        store: the definitions.
-    """
+    """Makes messages; their definitions are those of ROS 2 Jazzy."""
 
     def __init__(self) -> None:
         self.store = get_typestore(Stores.ROS2_JAZZY)

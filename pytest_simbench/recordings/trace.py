@@ -13,7 +13,6 @@ each column by itself: the rounding noise of bodies at rest would be nine tenths
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +25,7 @@ import numpy as np
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.ground.files import FileError, read_arrays, read_json
 from pytest_simbench.recordings.figure import Figure, Mesh
-from pytest_simbench.records.paths import write_whole
+from pytest_simbench.records.paths import whole
 from pytest_simbench.scene import Body, FloatArray, Scene
 
 LARGEST = 512 * 2**20
@@ -46,7 +45,6 @@ class Trace:
 
     Attributes:
         time, joints, bodies: see the module.
-        joint_names, body_names: of the joints and of the free bodies.
         boxes: all bodies of the scene, the free ones in the order of `body_names`, as they began.
         figure: the robot; None for a scene without one.
         phases: when each began [s], and its name, in the order of time.
@@ -118,18 +116,17 @@ class Trace:
         meshes: dict[str, Any] = {}
         for k, mesh in enumerate(self.figure.meshes if self.figure else ()):
             meshes |= {f"vertices_{k}": mesh.vertices, f"faces_{k}": mesh.faces}
-        file = io.BytesIO()
-        np.savez_compressed(
-            file,
-            time=self.time,
-            joints=_rounded(self.joints[:, :1], self.joints[:, 1:], axis=1),
-            bodies=_rounded(self.bodies[:, :, :7], self.bodies[:, :, 7:], axis=2),
-            joint_names=np.array(self.joint_names, dtype=np.str_),
-            body_names=np.array(self.body_names, dtype=np.str_),
-            about=np.frombuffer(json.dumps(about).encode(), dtype=np.uint8),
-            **meshes,
-        )
-        write_whole(folder, name, file.getvalue())
+        with whole(folder, name) as file:
+            np.savez_compressed(
+                file,
+                time=self.time,
+                joints=_rounded(self.joints[:, :1], self.joints[:, 1:], axis=1),
+                bodies=_rounded(self.bodies[:, :, :7], self.bodies[:, :, 7:], axis=2),
+                joint_names=np.array(self.joint_names, dtype=np.str_),
+                body_names=np.array(self.body_names, dtype=np.str_),
+                about=np.frombuffer(json.dumps(about).encode(), dtype=np.uint8),
+                **meshes,
+            )
 
     @classmethod
     def read(cls, path: Path) -> Trace:

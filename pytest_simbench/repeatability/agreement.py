@@ -45,7 +45,6 @@ class Facts:
     Attributes:
         label: simulator, with mode and profile where a reader needs them.
         task, seed: what was run; only equal ones are compared.
-        bodies: names of the free bodies.
     """
 
     label: str
@@ -163,7 +162,6 @@ class Agreement:
     """Two simulators and one seed.
 
     Attributes:
-        first, second: their labels.
         partings: by distance [m]; None: they never differ so much.
         commands_part: simulated time of the first operation whose set points or duration differ
             [s]; None: all commands are the same.

@@ -25,7 +25,6 @@ class Episode:
     Attributes:
         counts: those of its metrics that count things: what "the outcome" means here.
         motions: their samples, see `TapedWorld.motions`.
-        bodies: names of the free bodies.
         left_at: when the task asked for something else than the tape that was played [s].
     """
 

@@ -90,7 +90,6 @@ def difference(
 
     Args:
         first, second: `TapedWorld.motions` of both.
-        bodies: names of the free bodies.
     """
     found = _first_difference(first, second)
     if found is None:

@@ -22,7 +22,6 @@ class Quantity:
     """Something that can be perturbed.
 
     Attributes:
-        name: as in `QUANTITIES`.
         of: whether each cube has its own, or the scene or the robot has one.
         step: the smallest change considered, in SI units (or a share of the value).
         bound: the largest change by default, in the same.
@@ -65,7 +64,6 @@ class Perturbation:
     """One quantity, changed by a whole number of its steps.
 
     Attributes:
-        quantity: name of one of `QUANTITIES`.
         steps: how many, with sign.
         body: the cube's name, "" for what cubes do not have.
     """

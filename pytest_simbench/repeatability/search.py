@@ -76,7 +76,6 @@ class Attack:
     not deterministic cannot make Hypothesis find its examples flaky.
 
     Args:
-        episodes: to be perturbed.
         examples: how many runs it may take, the unperturbed one not counted; more may be allowed
             later.
     """

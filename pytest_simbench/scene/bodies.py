@@ -37,11 +37,6 @@ class Box(Body, kind="box"):
     def volume(self) -> float:
         return float(np.prod(self.size))
 
-    def even_inertia(self) -> FloatArray:
-        """m/12 (b^2 + c^2) about the axis along a."""
-        squares = np.square(self.size)
-        return np.asarray(self.mass / 12.0 * (squares.sum() - squares))
-
     def solids(self) -> list[Solid]:
         return [Solid("box", self.size)]
 
@@ -287,11 +282,6 @@ class Compound(Body, kind="compound"):
     def volume(self) -> float:
         """The sum over its shapes: what two of them share counts twice."""
         return sum(shape.volume for shape in self.shapes)
-
-    def even_inertia(self) -> FloatArray:
-        """Of the box around it; a body that moves has `moments`."""
-        squares = np.square(self.extents)
-        return np.asarray(self.mass / 12.0 * (squares.sum() - squares))
 
     def with_friction(self, friction: float) -> Compound:
         shapes = tuple(shape.with_friction(friction) for shape in self.shapes)

@@ -213,9 +213,11 @@ class Body(_Placed):
         """Principal moments about the centre, along the body's axes, (3,) [kg m^2]."""
         return self.even_inertia() if self.moments is None else np.array(self.moments)
 
-    @abstractmethod
     def even_inertia(self) -> FloatArray:
-        """The same of a body whose mass is spread evenly."""
+        """The same of a body whose mass is spread evenly; here of the box around it, m/12 (b^2 +
+        c^2) about the axis along a. A compound that moves has `moments`."""
+        squares = np.square(self.extents)
+        return np.asarray(self.mass / 12.0 * (squares.sum() - squares))
 
     @abstractmethod
     def solids(self) -> list[Solid]:

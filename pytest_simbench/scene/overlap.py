@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -12,6 +12,11 @@ from pytest_simbench.scene.pose import FloatArray, unit_rotation
 
 PARALLEL = 1e-9
 """Two edges whose directions' product is shorter than this are parallel and give no axis."""
+
+
+def box_corners(size: Sequence[float] | FloatArray) -> FloatArray:
+    """Corners (8, 3) of a box of edge lengths `size` about its centre [m]."""
+    return np.asarray(np.array(list(product((-0.5, 0.5), repeat=3))) * np.asarray(size))
 
 
 def rotations(quaternions: FloatArray) -> FloatArray:

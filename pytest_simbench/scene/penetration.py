@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 
 from pytest_simbench.scene.bodies import Box, Compound, ConvexMesh
 from pytest_simbench.scene.body import Body
-from pytest_simbench.scene.overlap import distance, overlaps, parted
+from pytest_simbench.scene.overlap import box_corners, distance, overlaps, parted
 from pytest_simbench.scene.pose import FloatArray
 
 
@@ -63,6 +61,5 @@ def _flat(body: Body) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     if isinstance(body, ConvexMesh):
         return body.hull.points, body.hull.normals, body.hull.edges
     if isinstance(body, Box):
-        corners = np.array(list(product((-0.5, 0.5), repeat=3))) * body.size
-        return corners, np.eye(3), np.eye(3)
+        return box_corners(body.size), np.eye(3), np.eye(3)
     return None

@@ -115,15 +115,13 @@ class Pose(Wire):
 
     def __mul__(self, other: Pose) -> Pose:
         """Composition: `other` is given in this pose's frame."""
-        x, y, z = self.rotation() @ np.asarray(other.position) + np.asarray(self.position)
-        quaternion = quaternion_product(self.quaternion, other.quaternion)
-        return Pose((float(x), float(y), float(z)), quaternion)
+        position = self.rotation() @ np.asarray(other.position) + np.asarray(self.position)
+        return Pose(vector3(position), quaternion_product(self.quaternion, other.quaternion))
 
     def inverse(self) -> Pose:
         """The transform back."""
         w, x, y, z = self.quaternion
-        px, py, pz = -(self.rotation().T @ np.asarray(self.position))
-        return Pose((float(px), float(py), float(pz)), (w, -x, -y, -z))
+        return Pose(vector3(-(self.rotation().T @ np.asarray(self.position))), (w, -x, -y, -z))
 
     def translated(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
         """The same orientation, moved by x, y, z [m] in the parent's frame."""

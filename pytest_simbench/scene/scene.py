@@ -150,22 +150,22 @@ class Scene(Wire):
                     f"{1000 * depth:.1f} mm; move one of them"
                 )
 
-    @property
+    @cached_property
     def free_bodies(self) -> tuple[Body, ...]:
         """The bodies that can move, in scene order: the rows of every body state. They are those
         with a mass and the prescribed ones."""
         return tuple(body for body in self.bodies if not body.fixed)
 
-    @property
+    @cached_property
     def prescribed_bodies(self) -> tuple[Body, ...]:
         """The bodies that move as prescribed, in scene order."""
         return tuple(body for body in self.bodies if body.prescribed)
 
-    @property
+    @cached_property
     def fixed_bodies(self) -> tuple[Body, ...]:
         return tuple(body for body in self.bodies if body.fixed)
 
-    @property
+    @cached_property
     def words(self) -> frozenset[str]:
         """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `compound`,
         `file` (read from one), `frictions` (several), `restitution`, `damping`, `wrench`,
@@ -193,7 +193,7 @@ class Scene(Wire):
         kinds = {part.kind for body in bodies for part in (body, *body.parts)}
         return frozenset(kinds | {word for word, there in found.items() if there})
 
-    @property
+    @cached_property
     def frictions(self) -> frozenset[float]:
         """Of all surfaces: the ground, the bodies, the robot."""
         robot = () if self.robot is None else (self.robot.friction,)

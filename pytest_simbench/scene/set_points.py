@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pytest_simbench.ground.errors import PolicyError
 from pytest_simbench.scene.checks import SceneError, check_number
 from pytest_simbench.scene.policy import Command, Kinematics, LoopError, Observation
-from pytest_simbench.scene.pose import FloatArray, Pose
+from pytest_simbench.scene.pose import FloatArray, Pose, vector3
 from pytest_simbench.scene.robot import FREE, Robot
 from pytest_simbench.scene.scene import Scene
 
@@ -136,7 +136,7 @@ class SetPoints:
             self._put(speeds, command.velocity, "velocity")
             position += self._period * speeds
         elif ways:
-            position = self._towards(self._tool(command))
+            position = self._towards(command)
         if command.gripper is not None:
             position[self._fingers] = self._finger(command.gripper)
         self.position = position
@@ -165,25 +165,16 @@ class SetPoints:
             f"joints, and {len(row)} with its fingers"
         )
 
-    def _tool(self, command: Command) -> Pose:
-        if command.tool is not None:
-            if not isinstance(command.tool, Pose):
-                raise PolicyError(f"the policy answers tool={command.tool!r:.60}, which is no Pose")
-            return command.tool
-        change = _numbers(command.tool_change, "tool_change")
-        if change.shape != (6,):
-            raise PolicyError(f"the policy answers a tool_change of shape {change.shape}, not (6,)")
+    def _towards(self, command: Command) -> FloatArray:
+        """Positions of the joints with which the tool goes where a command says."""
         if self._kinematics is None:
             raise PolicyError("inside the worker a policy commands joints, not the tool")
-        tool, angle = self._kinematics.tool_pose(self.position), float(np.linalg.norm(change[3:]))
-        i, j, k = (float(part) for part in np.sinc(angle / 2 / np.pi) / 2 * change[3:])
-        turned = Pose(quaternion=(math.cos(angle / 2), i, j, k)) * Pose(quaternion=tool.quaternion)
-        x, y, z = (float(part) for part in np.add(tool.position, change[:3]))
-        return Pose((x, y, z), turned.quaternion)
-
-    def _towards(self, tool: Pose) -> FloatArray:
-        if self._kinematics is None:
-            raise PolicyError("inside the worker a policy commands joints, not the tool")
+        tool: Any = command.tool
+        if tool is None:
+            change = _numbers(command.tool_change, "tool_change")
+            tool = _changed(self._kinematics.tool_pose(self.position), change)
+        if not isinstance(tool, Pose):
+            raise PolicyError(f"the policy answers tool={tool!r:.60}, which is no Pose")
         return self._kinematics.towards(self.position, tool, self._period)
 
     def _finger(self, width: float) -> float:
@@ -193,6 +184,16 @@ class SetPoints:
         low, high = sorted((self._robot.gripper.closed, self._robot.gripper.opened))
         wanted = value / 2 if self._kinematics is None else self._kinematics.finger(value)
         return float(np.clip(wanted, low, high))
+
+
+def _changed(tool: Pose, change: FloatArray) -> Pose:
+    """A pose, moved [m] and then turned by a rotation vector [rad], both along the world's axes."""
+    if change.shape != (6,):
+        raise PolicyError(f"the policy answers a tool_change of shape {change.shape}, not (6,)")
+    angle = float(np.linalg.norm(change[3:]))
+    i, j, k = vector3(np.sinc(angle / 2 / np.pi) / 2 * change[3:])
+    turned = Pose(quaternion=(math.cos(angle / 2), i, j, k)) * Pose(quaternion=tool.quaternion)
+    return Pose(vector3(np.add(tool.position, change[:3])), turned.quaternion)
 
 
 def _numbers(values: Any, what: str) -> FloatArray:

@@ -97,7 +97,7 @@ def drawer(friction: float, mass: float, at: Pose) -> Robot:
     write_joint(root, joint, RANGE, 2 * friction, FASTEST)
     motor = Joint(SLIDE, FREE, 0.0, 2 * friction, 0.0, 0.0, friction=friction)
     return Robot(
-        DRAWER, str(keep(ET.tostring(root, encoding="unicode"), {})), {}, "", (motor,),
+        DRAWER, str(keep(root)), {}, "", (motor,),
         Gripper((), 0.0, 0.0, 0.0), DRAWER, at,
     )  # fmt: skip
 
@@ -264,8 +264,7 @@ def _place(world: World) -> Pose:
     """Of the handle's middle: the drawer's frame."""
     robot = world.scene.robot
     assert robot is not None  # see `scene`
-    joints = dict(zip(robot.joint_names, world.joints[0].tolist(), strict=True))
-    return link_poses(PreparedRobot(robot), joints)[DRAWER]
+    return link_poses(PreparedRobot(robot), world.joints[0])[DRAWER]
 
 
 def _tool(world: World, hand: Manipulator) -> FloatArray:

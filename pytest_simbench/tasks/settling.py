@@ -171,9 +171,7 @@ def _links(prepared: PreparedRobot | None, positions: FloatArray | None) -> dict
     (n_joints,) [rad or m], None: the initial ones; none without a robot."""
     if prepared is None:
         return {}
-    robot = prepared.robot
-    joints = robot.column("initial_position") if positions is None else positions
-    poses = link_poses(prepared, dict(zip(robot.joint_names, joints.tolist(), strict=True)))
+    poses = link_poses(prepared, positions)
     return {
         link.name: poses[link.name] * Pose.at(*link.centre.tolist())
         for link in prepared.moving_links

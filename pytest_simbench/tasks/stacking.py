@@ -15,10 +15,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pytest_simbench.client.world import World
+from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.grasping import grasping
 from pytest_simbench.motion.model import grasping_scale_of
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.motion.planning import PlanningError
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Robot, Scene
 from pytest_simbench.tasks.arm import FULL_SPEED, LostBody, Speeds

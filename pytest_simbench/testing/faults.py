@@ -146,7 +146,7 @@ def edited(path: str, edit: Edit) -> Plant:
         if element is None:
             raise LookupError(f"{robot.urdf} has no {path}")
         edit(element)
-        urdf = keep(ET.tostring(root, encoding="unicode"), {})
+        urdf = keep(root)
         return replace(scene, robot=replace(robot, urdf=str(urdf)))
 
     return plant

@@ -145,7 +145,7 @@ class Approach:
 def link_clouds(robot: Robot) -> dict[str, FloatArray]:
     """The corners of each link that has a shape, in the world, (n, 3) [m]: its hull's."""
     prepared = PreparedRobot(robot)
-    poses = link_poses(prepared, {joint.name: joint.initial_position for joint in robot.joints})
+    poses = link_poses(prepared)
     return {
         link.name: np.vstack([placed(shape_points(s), poses[link.name]) for s in link.shapes])
         for link in prepared.links.values()

@@ -61,7 +61,6 @@ class State:
     Attributes:
         point: logarithms of the unknowns, then the starts of joints.
         columns: residuals there.
-        record: of the repetition.
         slopes: of the residuals over their noise, flat, by each number of the point.
     """
 

@@ -64,10 +64,8 @@ class Judgement:
     Attributes:
         verdict: `better`, `not worse`, `worse` or `not shown`.
         looks: laws or seeds behind it.
-        before, after: errors.
         worse_by: by how much the error is larger, with its interval; None of laws and claims.
         cheaper: today's cost over the candidate's, with its interval; None where too few.
-        reason: of the verdict.
     """
 
     verdict: str

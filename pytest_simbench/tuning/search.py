@@ -70,8 +70,6 @@ class Search:
     Attributes:
         trials: what looks at candidates.
         base: the settings that it begins with.
-        space: what is varied.
-        seed: of the sampler.
         tell: takes each candidate that ended, with the front until then.
     """
 

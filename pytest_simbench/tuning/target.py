@@ -93,7 +93,6 @@ class Target:
     """What is tuned for.
 
     Attributes:
-        name: as it was given.
         cost: name of one of `records.metrics.COSTS`, the less the better.
         chosen, judged: by what candidates are chosen, and what is kept for the verdict.
         metric: of the task; None for laws and claims.
@@ -133,8 +132,6 @@ class Target:
         each, below 0 on their right side.
 
         Args:
-            look: whose repetition.
-            record: of it.
             first: the first record of the look: of a smaller time step, or today's. A law's error
                 is told in its tolerance at the step of today's profile, for every candidate: a
                 longer step would be allowed more.

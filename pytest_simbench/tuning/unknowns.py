@@ -168,7 +168,7 @@ def _heavy(robot: Robot, link: str, mass: float) -> Robot:
     for element in inertial:
         for key in {"value", *INERTIA} & {*element.keys()}:
             element.set(key, repr(factor * float(element.get(key, 0))))
-    return replace(robot, urdf=str(keep(ET.tostring(xml, encoding="unicode"), {})), packages={})
+    return replace(robot, urdf=str(keep(xml)), packages={})
 
 
 def _inertials(xml: ET.Element) -> Iterator[tuple[str, ET.Element]]:

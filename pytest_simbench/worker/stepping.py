@@ -116,7 +116,6 @@ class Clocks:
     """What stepping has cost since the world was loaded.
 
     Attributes:
-        steps: number of time steps.
         simulated: [s].
         wall: seconds in the stepping loop, without log, window, pacing and control [s].
         waited: how much of that the thread waited for a processor that others had [s].

@@ -261,8 +261,7 @@ class Obstacles:
         """
         frames = [bodies[:, :7], self._fixed]
         if self._robot is not None:
-            positions = dict(zip(self._robot.robot.joint_names, joints, strict=True))
-            poses = link_poses(self._robot, positions)
+            poses = link_poses(self._robot, joints)
             frames.append(np.array([poses[name].as_array() for name in self._robot.links]))
         at = np.concatenate(frames)
         local = np.einsum("nij,nki->nkj", rotations(at[:, 3:]), bodies[rows, :3] - at[:, None, :3])

@@ -16,13 +16,15 @@ import pytest
 
 import pytest_simbench as simbench
 from pytest_simbench.cli.main import main
-from pytest_simbench.client.errors import Unavailable, WorkerExited
+from pytest_simbench.client.errors import Unavailable, Where, WorkerError, WorkerExited
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.motion.registry import find
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.record import Failure
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks import Stacking
-from tests.api.scripted import FAULTS, Scripted
 from tests.conftest import workers
+from tests.made_up import MadeUp
 from tests.tiny import Falling
 
 TWO = ("mujoco", "pybullet")
@@ -30,13 +32,33 @@ TWO = ("mujoco", "pybullet")
 
 @pytest.fixture
 def scripted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[dict[str, Any]]:
-    """Repetitions are made up, and every simulator is ready; what their second one ends with."""
+    """Repetitions are made up, and every simulator is ready; what their second one ends with, by
+    simulator."""
+    faults: dict[str, Any] = {}
+    opened: list[MadeUp] = []
+
+    def end(experiment: Experiment, number: int) -> tuple[dict[str, Any], BaseException | None]:
+        case, kind = experiment.case, faults.get(experiment.case.simulator)
+        if number != 2 or kind is None:
+            return {"metrics": {"landed": 0.5}, "status": "ok"}, None
+        where = [Where(case.simulator, case.mode)] if issubclass(kind, WorkerError) else []
+        told = {"error": Failure(kind.__name__, "no such luck", "fall")}
+        told["status"] = "interrupted" if kind is KeyboardInterrupt else "failed"
+        return told, kind("no such luck", *where)
+
+    class Opened(MadeUp):
+        def __init__(self, jobs: int) -> None:
+            super().__init__(jobs, end)
+            opened.append(self)
+
+        def close(self) -> None:
+            opened.remove(self)
+
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pytest_simbench.api.running.LocalExecutor", Scripted)
+    monkeypatch.setattr("pytest_simbench.api.running.LocalExecutor", Opened)
     monkeypatch.setattr("pytest_simbench.client.environments.missing", lambda info: None)
-    yield FAULTS
-    assert not Scripted.made
-    FAULTS.clear()
+    yield faults
+    assert not opened
 
 
 def test_records_are_those_of_a_pytest_run(scripted: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""The command `simbench` as a user types it, in a process of its own."""
+"""The command `simbench` as a user types it, in a process of its own or in this one."""
 
 from __future__ import annotations
 
@@ -7,9 +7,20 @@ import sys
 
 import pytest
 
+from pytest_simbench.cli.main import main
+
 
 def simbench(pytester: pytest.Pytester, *words: str) -> pytest.RunResult:
     """What it prints and how it ends. It draws where the test's inner runs of pytest do."""
     undrawn = "tests.undrawn" in os.environ["PYTEST_ADDOPTS"]
     module = "tests.undrawn" if undrawn else "pytest_simbench"
     return pytester.run(sys.executable, "-m", module, *words)
+
+
+def said(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of a command line in this process."""
+    try:
+        status = main(words)
+    except SystemExit as error:
+        status = int(error.code or 0)
+    return status, *capsys.readouterr()

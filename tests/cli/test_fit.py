@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.cli.main import main
+from tests.cli.command import said
 
 DRIVE = """
 <mujoco model="drive">
@@ -101,11 +102,7 @@ def test_the_mass_and_both_gains_are_not_told_apart(
 def test_bad_input(
     change: dict[str, str], message: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    try:
-        status = main([change.get(word, word) for word in BOTH])
-    except SystemExit as error:
-        status = int(error.code or 0)
-    told = capsys.readouterr().err
+    status, _, told = said(capsys, *(change.get(word, word) for word in BOTH))
     assert (status, told.count("\n")) == (2, 1)
     assert message in told
     assert not (folder / "out").exists()

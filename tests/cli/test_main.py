@@ -13,21 +13,13 @@ import pytest
 
 import pytest_simbench
 from pytest_simbench.cli import environments
-from pytest_simbench.cli.main import COMMANDS, main
+from pytest_simbench.cli.main import COMMANDS
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.simulator.registry import adapter, registered
+from tests.cli.command import said
 from tests.motion.small_arm import small_arm
 
 NAMES = [command.name for command in COMMANDS]
-
-
-def said(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error of a command line."""
-    try:
-        status = main(words)
-    except SystemExit as error:
-        status = int(error.code or 0)
-    return status, *capsys.readouterr()
 
 
 def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
@@ -97,10 +89,7 @@ def test_help_loads_nothing_large() -> None:
         ("watch nosuch", "simbench watch: unknown simulator 'nosuch'; choose from *mujoco*"),
         ("watch ode", "simbench watch: ode: no package index has its releases; choose from *"),
         ("watch mujoco==3.3.7", "*: name the simulator alone; --since mujoco==3.3.7 begins *"),
-        (
-            "watch --since mujoco",
-            "*: --since mujoco: write it as NAME==RELEASE or *",
-        ),
+        ("watch --since mujoco", "*: --since mujoco: write it as NAME==RELEASE or *"),
         ("watch mujoco --scene no.xml", "*: --scene no.xml: there is no such file; give an *"),
         ("watch mujoco --limit no:5%", "*: --limit: no metric is named 'no'; valid names: *"),
         ("watch mujoco --output seen", "*: seen/watch.json: *; remove it to begin anew"),
@@ -219,9 +208,10 @@ def test_a_reader_that_ends_early_is_no_fault(tmp_path: Path) -> None:
 
 
 def test_settings_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["list", "--settings", "mujoco"]) == 0
-    told = capsys.readouterr().out
+    status, told, _ = said(capsys, "list", "--settings", "mujoco")
+    assert status == 0
     assert "solref             0.02/1 " in told
     assert "0.001 to 0.05 log, 0.5 to 4 log " in told
-    assert main(["list", "--settings", "mujoko"]) == 2
-    assert "unknown simulator 'mujoko'; choose from " in capsys.readouterr().err
+    status, _, told = said(capsys, "list", "--settings", "mujoko")
+    assert status == 2
+    assert "unknown simulator 'mujoko'; choose from " in told

@@ -14,6 +14,7 @@ import pytest
 
 from pytest_simbench.cli.main import main
 from pytest_simbench.simulator.profile_file import read_profile
+from tests.cli.command import said
 
 pytest.importorskip("optuna")
 
@@ -116,45 +117,32 @@ def test_killed_and_gone_on_with(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("laws:x", "--sim", "mujoco"), "no law or phenomenon is named 'x'"),
-        (("stacking",), "name a simulator: --sim NAME"),
-        (("x.py::test_x", "--sim", "mujoco"), "file or directory not found: x.py"),
-        (("stacking", "--sim", "mujoco", "--jobs", "0"), "whole number from 1 to 256, or auto"),
+        ("laws:x --sim mujoco", "no law or phenomenon is named 'x'"),
+        ("stacking", "name a simulator: --sim NAME"),
+        ("x.py::test_x --sim mujoco", "file or directory not found: x.py"),
+        ("stacking --sim mujoco --jobs 0", "whole number from 1 to 256, or auto"),
         (
-            ("stacking", "--sim", "mujoco", "--jobs", "2", "--cluster", "tcp://127.0.0.1:1"),
+            "stacking --sim mujoco --jobs 2 --cluster tcp://127.0.0.1:1",
             "--cluster: leave out --jobs",
         ),
-        (
-            ("stacking", "--sim", "mujoco,drake", "--settings", "condim"),
-            "none of 2 simulators could be tuned",
-        ),
-        (("tosses", "--sim", "mujoco"), "simbench download cube_tosses"),
-        (("stacking", "--sim", "mujoko"), "unknown simulator 'mujoko'; choose from"),
-        (("stacking", "--sim", "mujoco", "--settings", "condim"), "no setting 'condim' to search"),
-        (("stacking", "--sim", "mujoco", "--budget", "5"), "give a time: 90s, 30min or 2h"),
-        (("stacking", "--sim", "mujoco", "--profile", "tuned,real"), "give one profile"),
-        (
-            ("stacking", "--sim", "mujoco", "--profile", "no.toml"),
-            "cannot read the profile no.toml",
-        ),
-        (
-            ("stacking", "--sim", "mujoco", "--profile", "best"),
-            "no simulator has a settings profile",
-        ),
+        ("stacking --sim mujoco,drake --settings condim", "none of 2 simulators could be tuned"),
+        ("tosses --sim mujoco", "simbench download cube_tosses"),
+        ("stacking --sim mujoko", "unknown simulator 'mujoko'; choose from"),
+        ("stacking --sim mujoco --settings condim", "no setting 'condim' to search"),
+        ("stacking --sim mujoco --budget 5", "give a time: 90s, 30min or 2h"),
+        ("stacking --sim mujoco --profile tuned,real", "give one profile"),
+        ("stacking --sim mujoco --profile no.toml", "cannot read the profile no.toml"),
+        ("stacking --sim mujoco --profile best", "no simulator has a settings profile"),
     ],
 )
 def test_bad_input(
-    words: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    words: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SIMBENCH_DATA", str(tmp_path / "none"))
-    try:
-        status = main(["tune", *words])
-    except SystemExit as error:
-        status = int(error.code or 0)
-    told = capsys.readouterr().err
+    status, _, told = said(capsys, "tune", *words.split())
     assert (status, told.count("\n")) == (2, 1)
     assert message in told
     assert not list(tmp_path.iterdir())

@@ -1,7 +1,7 @@
 """Adapters that misbehave on purpose: a real engine, with one fault each.
 
-Workers load them as `tests.client.faulty:NAME`. Those of `FAULTS` and `OTHERS` are on MuJoCo or, as
-`PyBullet_NAME`, on PyBullet; those of `LIES` and `RAISED` are `Lies KEY` and `Raises KEY`.
+Workers load them as `tests.client.faulty:NAME`. Those of `FAULTS` and `MOMENTS` are on MuJoCo or,
+as `PyBullet_NAME`, on PyBullet; those of `LIES` and `RAISED` are `Lies KEY` and `Raises KEY`.
 """
 
 from __future__ import annotations
@@ -67,25 +67,6 @@ class Blind(MuJoCo):
         raise self._missing("offscreen picture")
 
 
-class Chatty(Simulator):
-    """Writes garbage to the real stdout, where execnet's messages would go."""
-
-    def step(self) -> None:
-        super().step()  # type: ignore[safe-super]
-        os.write(1, b"\xff\x00garbage\n")
-
-
-class CrashesClosing(Simulator):
-    def close(self) -> None:
-        os.kill(os.getpid(), signal.SIGSEGV)
-
-
-class WrongGravity(Simulator):
-    def load(self, scene: Scene) -> None:
-        super().load(scene)  # type: ignore[safe-super]
-        HEAVIER[self.info.name](self)
-
-
 COMPILE_SECONDS = 1.5
 
 
@@ -100,11 +81,6 @@ class Costly(Simulator):
         Costly.compiled += 1
 
 
-class NeverCompiled(Simulator):
-    def compile(self, scene: Scene) -> None:
-        time.sleep(600)
-
-
 class Restless(Simulator):
     """Does not put the clock back when it loads again."""
 
@@ -115,60 +91,6 @@ class Restless(Simulator):
             self.step()
 
     loads = 0
-
-
-def hold_the_interpreter(seconds: float) -> None:
-    """No other thread of this process runs meanwhile, that which reads messages included."""
-    ctypes.PyDLL(None).usleep(ctypes.c_uint(int(seconds * 1e6)))
-
-
-class StopsBetweenRequests(MuJoCo):
-    """Answers `load`, and a moment later stops, so that nobody reads the next request."""
-
-    def load(self, scene: Scene) -> None:
-        super().load(scene)
-        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGSTOP)).start()
-
-
-class HoldsTheInterpreter(MuJoCo):
-    """Answers `load`; then a thread of its own lets no other run."""
-
-    def load(self, scene: Scene) -> None:
-        super().load(scene)
-        threading.Timer(0.3, hold_the_interpreter, (600.0,)).start()
-
-
-class StopsLoading(MuJoCo):
-    def load(self, scene: Scene) -> None:
-        os.kill(os.getpid(), signal.SIGSTOP)
-
-
-class StopsBeingMade(MuJoCo):
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        os.kill(os.getpid(), signal.SIGSTOP)
-
-
-class StopsClosing(MuJoCo):
-    def close(self) -> None:
-        os.kill(os.getpid(), signal.SIGSTOP)
-
-
-class Chatters(MuJoCo):
-    """Says that it is alive as often as it can, each time a little later."""
-
-    def step(self) -> None:
-        super().step()
-        server = next(o for o in gc.get_objects() if isinstance(o, Server))
-        for k in range(10**9):
-            server.send({"alive": self.time + k})
-
-
-class LeavesFiles(MuJoCo):
-    def load(self, scene: Scene) -> None:
-        super().load(scene)
-        with open(os.environ["UNRULY"], "w") as file:
-            file.write(tempfile.mkdtemp())
 
 
 @dataclass(frozen=True)
@@ -215,11 +137,6 @@ RAISED: dict[str, Any] = {
     "parity": lambda: ParityError("\udfff" * 3000),
     "derived": lambda: Derived("no driver"),
 }
-
-
-class ExitsLoading(MuJoCo):
-    def load(self, scene: Scene) -> None:
-        sys.exit(5)
 
 
 class Parent(MuJoCo):
@@ -278,6 +195,10 @@ class Faulty(Simulator):
         super().step()  # type: ignore[safe-super]  # the engine comes next in the method order
         if self.time >= FAULT_TIME and not self.done:
             self.done = bool(self.fault())
+
+
+def kill(number: int) -> Callable[[Any], None]:
+    return lambda simulator: os.kill(os.getpid(), number)
 
 
 def crash(simulator: Any) -> None:
@@ -342,8 +263,8 @@ def send(message: bytes) -> None:
 
 
 FAULTS: dict[str, Callable[[Any], object]] = {
-    "Killed": lambda simulator: os.kill(os.getpid(), signal.SIGKILL),
-    "Stopped": lambda simulator: os.kill(os.getpid(), signal.SIGSTOP),
+    "Killed": kill(signal.SIGKILL),
+    "Stopped": kill(signal.SIGSTOP),
     "Crashed": crash,
     "Hung": hold,
     "Raising": complain,
@@ -361,7 +282,57 @@ FAULTS: dict[str, Callable[[Any], object]] = {
 }
 """What an engine does in the middle of a motion."""
 
-OTHERS = (Chatty, CrashesClosing, WrongGravity, Costly, NeverCompiled, Restless)
+
+def soon(act: Callable[[Any], object]) -> Callable[[Any], None]:
+    """A moment later, when the answer is sent."""
+    return lambda simulator: threading.Timer(0.3, act, (simulator,)).start()
+
+
+def chatter(simulator: Any) -> None:
+    """Say that it is alive as often as it can, each time a little later."""
+    server = next(o for o in gc.get_objects() if isinstance(o, Server))
+    for k in range(10**9):
+        server.send({"alive": simulator.time + k})
+
+
+def leave_files(simulator: Any) -> None:
+    Path(os.environ["UNRULY"]).write_text(tempfile.mkdtemp())
+
+
+INSTEAD, AFTER = False, True
+"""Instead of what the engine does, or when it has done it."""
+
+MOMENTS: dict[str, tuple[str, bool, Callable[[Any], object]]] = {
+    "StopsBeingMade": ("__init__", AFTER, kill(signal.SIGSTOP)),
+    "NeverCompiled": ("compile", INSTEAD, lambda simulator: time.sleep(600)),
+    "StopsLoading": ("load", INSTEAD, kill(signal.SIGSTOP)),
+    "ExitsLoading": ("load", INSTEAD, lambda simulator: sys.exit(5)),
+    "WrongGravity": ("load", AFTER, lambda simulator: HEAVIER[simulator.info.name](simulator)),
+    "LeavesFiles": ("load", AFTER, leave_files),
+    # so that nobody reads the next request, in the latter since no other thread runs
+    "StopsBetweenRequests": ("load", AFTER, soon(kill(signal.SIGSTOP))),
+    "HoldsTheInterpreter": ("load", AFTER, soon(hold)),
+    # to the real stdout, where execnet's messages would go
+    "Chatty": ("step", AFTER, lambda simulator: os.write(1, b"\xff\x00garbage\n")),
+    "Chatters": ("step", AFTER, chatter),
+    "StopsClosing": ("close", INSTEAD, kill(signal.SIGSTOP)),
+    "CrashesClosing": ("close", INSTEAD, kill(signal.SIGSEGV)),
+}
+"""What it does when it is asked for something."""
+
+COSTLY = ("Costly", "NeverCompiled", "Restless")
+
+
+def asked(fault: str, cls: type[Simulator]) -> type[Simulator]:
+    """The engine with a fault of `MOMENTS`."""
+    method, after, act = MOMENTS[fault]
+
+    def does(self: Any, *arguments: Any, **options: Any) -> None:
+        if after:
+            getattr(cls, method)(self, *arguments, **options)
+        act(self)
+
+    return type(fault, (cls,), {method: does})
 
 
 def raise_one(key: str) -> None:
@@ -380,8 +351,11 @@ def __getattr__(name: str) -> Any:
     cls = ENGINES[engine]
     if fault in FAULTS:
         return type(name, (Faulty, cls), {"fault": FAULTS[fault]})
-    for made in OTHERS:
-        if made.__name__ == fault:
-            info = replace(cls.info, costly_start=fault in ("Costly", "NeverCompiled", "Restless"))
-            return type(name, (made, cls), {"info": info})
-    raise AttributeError(name)
+    if fault in MOMENTS:
+        made = asked(fault, cls)
+    elif fault in COSTLY:
+        made = type(name, ({"Costly": Costly, "Restless": Restless}[fault], cls), {})
+    else:
+        raise AttributeError(name)
+    made.info = replace(cls.info, costly_start=fault in COSTLY)
+    return made

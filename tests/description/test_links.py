@@ -44,7 +44,7 @@ PREPARED, MODEL = PreparedRobot(ROBOT), RobotModel(ROBOT)
 @pytest.mark.parametrize("seed", range(3))
 def test_poses_are_pinocchios(seed: int) -> None:
     q = np.random.default_rng(seed).uniform(-1.0, 1.0, len(ROBOT.joints))
-    poses = link_poses(PREPARED, dict(zip(ROBOT.joint_names, q, strict=True)))
+    poses = link_poses(PREPARED, q)
     data = MODEL.pin.createData()
     pin.forwardKinematics(MODEL.pin, data, q)
     for joint in PREPARED.joints:

@@ -121,27 +121,6 @@ def test_the_tool_centre_point_may_lie_beside_a_link(tmp_path: Path) -> None:
     assert PreparedRobot(moved).links.keys() == PreparedRobot(plain.robot).links.keys()
 
 
-@pytest.mark.parametrize(
-    ("toml", "message"),
-    [
-        (
-            still(0, 0).replace("left_finger", "lost_finger"),
-            r"small\.toml: locked: 'lost_finger' is no moving joint of the URDF; it has turn,",
-        ),
-        (still(0, 0) + "bend = 0.1\n", r"joints: 'bend' is no moving joint of the URDF; it has tu"),
-        (still(0, 0).replace("= 0\n", "= nan\n", 1), r"\[locked\]: left_finger: nan is no number"),
-        (
-            TOML.replace('"grip"', '"grab"') + "xyz = [0.0, 0.0, 0.0]\n",
-            r"the tool frame 'grab' is no link; choose from foot, column, upper, lower",
-        ),
-    ],
-)
-def test_what_cannot_be_changed_is_a_sentence(tmp_path: Path, toml: str, message: str) -> None:
-    with pytest.raises(RobotError, match=message) as caught:
-        read_robot(small_arm(tmp_path, toml))
-    assert "\n" not in str(caught.value)
-
-
 def test_an_arm_from_outside_pushes_from_a_file_alone(case: Case, tmp_path: Path) -> None:
     """The Mico2 of the measured pushes: joints without end, three fingers, its tool at no link."""
     folder = measured("arm_pushes").urdf.parent

@@ -178,6 +178,13 @@ def swap(old: str, new: str) -> Change:
     return change
 
 
+def more(text: str, before: str = "") -> Change:
+    """Says this after, and that before everything else."""
+    return lambda toml: f"{before}\n{toml}\n{text}\n"
+
+
+HULLS = "hull_corners = 99"
+SWING = "[throw]\nstart = [0.1, 0.2, 0.3]\nend = "
 LOOP = '<mimic joint="right_finger"/></joint>'
 SRDF = swap("[arm]", 'srdf = "small.toml"\n[arm]')
 
@@ -261,6 +268,32 @@ IN_TOML = {
         lambda text: text[: text.index("[hand]")] + '[hand]\nuse = "panda"\nmount = "flange"\n',
         r"the hand is mounted on 'flange', which is no link of the arm; choose from foot, column",
     ),
+    "a locked joint that is none": (
+        more("[locked]\nlost_finger = 0"), r"small\.toml: locked: 'lost_finger' is no moving joint"
+    ),
+    "a joint of the arm that is locked": (
+        more("[locked]\nbend = 0.1"), r"joints: 'bend' is no moving joint of the URDF; it has"
+    ),
+    "locked at no number": (more("[locked]\nbend = nan"), r"\[locked\]: bend: nan is no number of"),
+    "a tool beside no link": (
+        lambda text: swap('"grip"', '"grab"')(text) + "xyz = [0.0, 0.0, 0.0]\n",
+        r"the tool frame 'grab' is no link; choose from foot, column, upper, lower",
+    ),
+    "a swing of too few angles": (more(SWING + "[0.4, 0.5]"), r"\[throw\]: end: give it 3 numbers"),
+    "a swing with more in it": (
+        more(SWING + "[0.4, 0.5, 0.6]\nstop = 1"), r"\[throw\]: 'stop' means nothing here; valid: "
+    ),
+    "too few corners": (more("", "hull_corners = 12"), "hull_corners: give a whole number of"),
+    "cuts without hulls": (
+        more('[cut]\nupper = { axis = "z", at = [0.1] }'), "cut: give hull_corners too"
+    ),
+    "a cut of no link": (
+        more('[cut]\nno = { axis = "z", at = [0.1] }', HULLS), "cut: 'no' is no link; it has foot"
+    ),
+    "a cut across no axis": (
+        more('[cut]\nupper = { axis = "w", at = [0.1] }', HULLS), "axis: choose from x, y, z"
+    ),
+    "a cut nowhere": (more('[cut]\nupper = { axis = "x", at = [] }', HULLS), "at: give it a list"),
     "a list of pairs that is none": (SRDF, r"list of link pairs .*small\.toml is not valid XML"),
 }  # fmt: skip
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
 from pytest_simbench.description.mesh_check import read_stl, written_stl
 from pytest_simbench.description.robot_files import content_of
-from pytest_simbench.motion.errors import RobotError
-from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.hulls import Cuts, extreme, stl, with_hulls
 from pytest_simbench.motion.registry import find
-from tests.motion.small_arm import TOML, small_arm
 
 
 @pytest.mark.parametrize("count", [50, 500])
@@ -61,23 +56,7 @@ def test_slices_fill_the_part_and_keep_to_their_planes() -> None:
     assert ConvexHull(hull.reshape(-1, 3)).volume > 1.5 * sum(volumes)
 
 
-@pytest.mark.parametrize(
-    ("corners", "cut", "message"),
-    [
-        ("", 'upper = { axis = "z", at = [0.1] }', "cut: give hull_corners too"),
-        ("hull_corners = 99", 'no = { axis = "z", at = [0.1] }', "cut: 'no' is no link"),
-        ("hull_corners = 99", 'upper = { axis = "w", at = [0.1] }', "axis: choose from x"),
-        ("hull_corners = 99", 'upper = { axis = "x", at = [] }', "at: give it a list"),
-    ],
-)
-def test_cuts_that_cannot_be(tmp_path: Path, corners: str, cut: str, message: str) -> None:
-    with pytest.raises(RobotError, match=message):
-        read_robot(small_arm(tmp_path, f"{corners}\n{TOML}\n[cut]\n{cut}\n"))
-
-
-def test_a_robot_file_asks_for_them(tmp_path: Path) -> None:
+def test_a_robot_file_asks_for_them() -> None:
     meshes = content_of(find("so101"))["meshes"].values()
     assert len(meshes) == 21  # 13 parts, two of them cut into 6 and 4 slices
     assert all(len(data) <= 84 + 50 * 2 * 126 for data in meshes)  # Euler: 2 n - 4 triangles
-    with pytest.raises(RobotError, match="hull_corners: give a whole number of at least 50"):
-        read_robot(small_arm(tmp_path, "hull_corners = 12\n" + TOML))

@@ -18,22 +18,23 @@ from pytest_simbench.motion.kinematics import (
     top_down_grasps,
 )
 from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.panda import READY as AT_READY
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import Pose
 from pytest_simbench.tasks.stacking import GRID, TABLE_TOP, TOWERS
 
-MODEL = RobotModel(panda())
+MODEL, READY = RobotModel(panda()), np.array(AT_READY)
 PLACES = [(x, y, TABLE_TOP + 0.025) for x, y in GRID] + [
     (x, y, TABLE_TOP + 0.05 * (level + 0.5)) for (x, y), level in product(TOWERS, range(5))
 ]
 
 
 @pytest.mark.parametrize("height", [0.0, 0.10], ids=["at", "above"])
-def test_every_pose_of_the_study_is_reachable(ready: FloatArray, height: float) -> None:
+def test_every_pose_of_the_study_is_reachable(height: float) -> None:
     for place in PLACES:
         for tool in top_down_grasps(Pose.at(*place).translated(z=height)):
-            q = inverse_kinematics(MODEL, tool, ready, np.random.default_rng(0))
+            q = inverse_kinematics(MODEL, tool, READY, np.random.default_rng(0))
             assert np.allclose(MODEL.tool_pose(q).matrix(), tool.matrix(), atol=1e-5)
 
 
@@ -68,9 +69,9 @@ def test_five_joints_cannot_turn_a_tool_as_they_like() -> None:
         inverse_kinematics(model, sideways, np.zeros(5), np.random.default_rng(0), restarts=3)
 
 
-def test_out_of_reach_says_where(ready: FloatArray) -> None:
+def test_out_of_reach_says_where() -> None:
     with pytest.raises(Unreachable, match=r"unreachable: tool at \(2.000, 0.000, 0.300\)"):
-        inverse_kinematics(MODEL, tool_over(Pose.at(2, 0, 0.3), 0.0), ready)
+        inverse_kinematics(MODEL, tool_over(Pose.at(2, 0, 0.3), 0.0), READY)
 
 
 def test_grasps_follow_the_yaw_of_a_cube_on_any_face() -> None:
@@ -82,16 +83,16 @@ def test_grasps_follow_the_yaw_of_a_cube_on_any_face() -> None:
             assert np.allclose(tool.rotation()[:, 2], [0, 0, -1])
 
 
-def test_a_straight_line_is_straight(ready: FloatArray) -> None:
-    above = inverse_kinematics(MODEL, tool_over(Pose.at(0.4, 0.1, 0.5), 0.2), ready)
+def test_a_straight_line_is_straight() -> None:
+    above = inverse_kinematics(MODEL, tool_over(Pose.at(0.4, 0.1, 0.5), 0.2), READY)
     path = straight_line(MODEL, above, tool_over(Pose.at(0.4, 0.1, 0.35), 0.2))
     tips = np.array([MODEL.tool_pose(q).position for q in path])
     assert np.allclose(tips[:, :2], [0.4, 0.1], atol=1e-5)
     assert (np.diff(tips[:, 2]) < 0).all()
 
 
-def test_a_path_goes_through_its_poses(ready: FloatArray) -> None:
-    start = inverse_kinematics(MODEL, tool_over(Pose.at(0.4, 0.0, 0.3), 0.0), ready)
+def test_a_path_goes_through_its_poses() -> None:
+    start = inverse_kinematics(MODEL, tool_over(Pose.at(0.4, 0.0, 0.3), 0.0), READY)
     poses = [tool_over(Pose.at(0.4, 0.01 * k, 0.3), 0.05 * k) for k in range(1, 12)]
     path = tool_path(MODEL, start, poses)
     assert np.array_equal(path[0], start)
@@ -107,7 +108,7 @@ def test_a_path_goes_through_its_poses(ready: FloatArray) -> None:
     ],
     ids=["too far", "jump"],
 )
-def test_a_path_that_cannot_be_followed_says_so(end: Pose, message: str, ready: FloatArray) -> None:
-    start = inverse_kinematics(MODEL, tool_over(Pose.at(0.4, 0.0, 0.3), 0.0), ready)
+def test_a_path_that_cannot_be_followed_says_so(end: Pose, message: str) -> None:
+    start = inverse_kinematics(MODEL, tool_over(Pose.at(0.4, 0.0, 0.3), 0.0), READY)
     with pytest.raises(Unreachable, match=message):
         tool_path(MODEL, start, [end])

@@ -13,20 +13,36 @@ from pytest_simbench.motion.errors import InCollision
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import LIMITS, THROW_END, WIND_UP, panda
+from pytest_simbench.motion.panda import READY as AT_READY
 from pytest_simbench.motion.planning import MotionPlanner
 from pytest_simbench.motion.timing import TICK, Timed, along_path, straight_move, synchronised_move
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene
+from pytest_simbench.tasks import Jitter, Stacking
+
+MODEL, READY = RobotModel(panda()), np.array(AT_READY)
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return Stacking().scene(0, Jitter(0.0, 0.0))
+
+
+@pytest.fixture
+def planner(scene: Scene) -> MotionPlanner:
+    planning = PlanningScene(MODEL, scene)
+    return MotionPlanner(MODEL, planning, np.random.default_rng(1), scene.gravity)
+
 
 WALL = Box("wall", (0.1, 0.02, 0.5), Pose.at(0.5, 0.0, 0.55))
 
 
-def around_the_wall(model: RobotModel, ready: FloatArray, seed: int) -> tuple[FloatArray, bool]:
+def around_the_wall(seed: int) -> tuple[FloatArray, bool]:
     """Planned positions from one side of a wall to the other, and whether they are free."""
     scene = Scene("wall", (Box("table", (0.9, 0.9, 0.3), Pose.at(0.6, 0, 0.15)), WALL), panda())
-    planning = PlanningScene(model, scene)
-    planner = MotionPlanner(model, planning, np.random.default_rng(seed), scene.gravity)
+    planning = PlanningScene(MODEL, scene)
+    planner = MotionPlanner(MODEL, planning, np.random.default_rng(seed), scene.gravity)
     start, goal = (
-        inverse_kinematics(model, tool_over(Pose.at(0.5, y, 0.45), 0.0), ready) for y in (-0.2, 0.2)
+        inverse_kinematics(MODEL, tool_over(Pose.at(0.5, y, 0.45), 0.0), READY) for y in (-0.2, 0.2)
     )
     trajectory = planner.move_to(start, goal, 0.035)
     arm = trajectory.position[:, :7]
@@ -35,24 +51,22 @@ def around_the_wall(model: RobotModel, ready: FloatArray, seed: int) -> tuple[Fl
     return arm, planning.first_collision(arm, margin=False) is None
 
 
-def test_a_wall_is_passed_without_touching(model: RobotModel, ready: FloatArray) -> None:
-    arm, free = around_the_wall(model, ready, 3)
+def test_a_wall_is_passed_without_touching() -> None:
+    arm, free = around_the_wall(3)
     assert free
     straight = np.linspace(arm[0], arm[-1], len(arm))
     assert np.abs(arm - straight).max() > 0.1
 
 
-def test_same_seed_same_plan(model: RobotModel, ready: FloatArray) -> None:
-    first, _ = around_the_wall(model, ready, 3)
-    other, _ = around_the_wall(model, ready, 4)
-    again, _ = around_the_wall(model, ready, 3)
+def test_same_seed_same_plan() -> None:
+    first, _ = around_the_wall(3)
+    other, _ = around_the_wall(4)
+    again, _ = around_the_wall(3)
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
 
 
-def test_a_search_does_not_look_at_its_ends_again(
-    model: RobotModel, ready: FloatArray, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_search_does_not_look_at_its_ends_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """OMPL waits for ever for a goal that it finds invalid, and a touch of nothing may waver."""
     looks: list[bytes] = []
     real = PlanningScene.collision
@@ -63,7 +77,7 @@ def test_a_search_does_not_look_at_its_ends_again(
         return ("hand", "wall") if seen else real(scene, arm)
 
     monkeypatch.setattr(PlanningScene, "collision", wavering)
-    assert around_the_wall(model, ready, 3)[1]
+    assert around_the_wall(3)[1]
     assert len(looks) > 2
 
 
@@ -78,24 +92,20 @@ def test_fingers_open_at_the_release(planner: MotionPlanner) -> None:
         assert np.array_equal(trajectory.position[:, :7], throw.timed.position)
 
 
-def test_other_cubes_are_obstacles(
-    model: RobotModel, scene: Scene, planner: MotionPlanner, ready: FloatArray
-) -> None:
+def test_other_cubes_are_obstacles(scene: Scene, planner: MotionPlanner) -> None:
     cube = scene.body("cube_11").pose
-    at = inverse_kinematics(model, tool_over(cube, 0.0), ready)
+    at = inverse_kinematics(MODEL, tool_over(cube, 0.0), READY)
     touching = planner.scene.collision(at)
     assert "cube_11" in touching
     assert planner.scene.collision(at, ignored=["cube_11"], margin=False) is None
     with pytest.raises(InCollision, match="goal in collision: .*cube_11"):
-        planner.move_to(ready, at, 0.035)
+        planner.move_to(READY, at, 0.035)
 
 
-def test_a_held_cube_moves_with_the_hand(
-    model: RobotModel, scene: Scene, planner: MotionPlanner, ready: FloatArray
-) -> None:
+def test_a_held_cube_moves_with_the_hand(scene: Scene, planner: MotionPlanner) -> None:
     planning = planner.scene
     planning.opening = 0.025
-    low = inverse_kinematics(model, tool_over(Pose.at(0.6, 0.0, 0.385), 0.0), ready)
+    low = inverse_kinematics(MODEL, tool_over(Pose.at(0.6, 0.0, 0.385), 0.0), READY)
     assert planning.collision(low, margin=False) is None
     planning.update({"cube_01": Pose.at(0.6, 0.0, 0.325)})
     assert planning.collision(low, margin=False) is None
@@ -105,53 +115,49 @@ def test_a_held_cube_moves_with_the_hand(
     assert planning.collision(low, margin=False) is None
 
 
-def test_checks_are_close_together(planner: MotionPlanner, ready: FloatArray) -> None:
-    goal = ready + np.array([1.0, -0.3, 0.2, 0.3, -0.5, 0.2, 1.0])
-    rows = planner.move_to(ready, goal, 0.035).position[:, :7]
-    model = planner.model
-    tips = np.array([model.tool_pose(q).position for q in planner._thinned(rows)])
+def test_checks_are_close_together(planner: MotionPlanner) -> None:
+    goal = READY + np.array([1.0, -0.3, 0.2, 0.3, -0.5, 0.2, 1.0])
+    rows = planner.move_to(READY, goal, 0.035).position[:, :7]
+    tips = np.array([MODEL.tool_pose(q).position for q in planner._thinned(rows)])
     assert np.linalg.norm(np.diff(tips, axis=0), axis=1).max() < 0.035
 
 
-def test_feed_forward_carries_the_arm(planner: MotionPlanner, ready: FloatArray) -> None:
-    still = planner.move_fingers(ready, 0.035, 0.0, 0.1)
-    model = planner.model
-    q = model.full(ready)[None]
+def test_feed_forward_carries_the_arm(planner: MotionPlanner) -> None:
+    still = planner.move_fingers(READY, 0.035, 0.0, 0.1)
+    q = MODEL.full(READY)[None]
     zero = np.zeros_like(q)
-    expected = model.inverse_dynamics(planner.gravity, q, zero, zero)[0, :7]
+    expected = MODEL.inverse_dynamics(planner.gravity, q, zero, zero)[0, :7]
     assert np.allclose(still.effort[:, :7], expected, atol=0.2)
     assert (still.effort[:, 7:] == 0).all()
 
 
-def test_a_path_at_a_speed_of_the_tool(
-    planner: MotionPlanner, model: RobotModel, ready: FloatArray
-) -> None:
-    start = inverse_kinematics(model, tool_over(Pose.at(0.4, 0.0, 0.5), 0.0), ready)
+def test_a_path_at_a_speed_of_the_tool(planner: MotionPlanner) -> None:
+    start = inverse_kinematics(MODEL, tool_over(Pose.at(0.4, 0.0, 0.5), 0.0), READY)
     poses = [tool_over(Pose.at(0.4, 0.01 * k, 0.5), 0.02 * k) for k in range(1, 21)]
     slow = planner.move_along(start, poses, 0.0, tool_speed=0.05)
     assert slow.duration == pytest.approx(0.2 / 0.05, rel=0.01)
     assert np.allclose(slow.position[-1, 7:], 0.0)
     fast = planner.move_along(start, poses, 0.0, tool_speed=50.0)  # beyond the joints' limits
     assert 0.2 < fast.duration < 2.0
-    tips = np.array([model.tool_pose(q).position for q in fast.position[:, :7]])
+    tips = np.array([MODEL.tool_pose(q).position for q in fast.position[:, :7]])
     assert np.allclose(tips[:, [0, 2]], [0.4, 0.5], atol=1e-3)
 
 
-def test_a_path_touches_only_what_it_may(model: RobotModel, ready: FloatArray) -> None:
+def test_a_path_touches_only_what_it_may() -> None:
     block = Box("block", (0.1, 0.1, 0.05), Pose.at(0.5, 0.0, 0.295), mass=0.1)
-    scene = PlanningScene(model, Scene("path", (block,), panda()))
-    planner = MotionPlanner(model, scene, np.random.default_rng(0), (0.0, 0.0, -9.81))
-    start = inverse_kinematics(model, tool_over(Pose.at(0.38, 0.0, 0.3), 0.0), ready)
+    scene = PlanningScene(MODEL, Scene("path", (block,), panda()))
+    planner = MotionPlanner(MODEL, scene, np.random.default_rng(0), (0.0, 0.0, -9.81))
+    start = inverse_kinematics(MODEL, tool_over(Pose.at(0.38, 0.0, 0.3), 0.0), READY)
     poses = [tool_over(Pose.at(0.38 + 0.01 * k, 0.0, 0.3), 0.0) for k in range(1, 13)]
     planner.move_along(start, poses, 0.0, tool_speed=0.1, ignored=("block",))
     with pytest.raises(InCollision, match=r"^path blocked: panda_\w+ and block$"):
         planner.move_along(start, poses, 0.0, tool_speed=0.1)
 
 
-def test_the_front_of_the_closed_hand(model: RobotModel) -> None:
+def test_the_front_of_the_closed_hand() -> None:
     """Boxes of franka_description's fingers: 17.5 mm thick at the tips, each 15.2 mm wide; from
     24 mm above the tool centre point on they are 22 mm thick."""
-    scene = PlanningScene(model, Scene("front", (), panda()))
+    scene = PlanningScene(MODEL, Scene("front", (), panda()))
     assert scene.front(0.005) == pytest.approx((0.00875, 0.03036), abs=1e-5)
     depth, width = scene.front(0.02)
     assert depth == pytest.approx(0.00875, abs=1e-5)

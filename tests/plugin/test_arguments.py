@@ -34,28 +34,50 @@ TESTS = {
 }
 
 
-def no_error(result: pytest.RunResult) -> None:
+SETTINGS = {
+    "{'speed': 1}": ": mujoco has no setting 'speed'; choose from timestep=*",
+    "{3: 1}": ": mujoco has no setting 3; choose from timestep=*",
+    "{'timestep': 'fast'}": ": mujoco.timestep=fast: give a finite number",
+    "{'timestep': None}": ": mujoco.timestep=None: give a finite number",
+    "{'timestep': float('inf')}": ": mujoco.timestep=inf: give a finite number",
+    "{'timestep': 5}": ": mujoco.timestep=5: give a number of seconds from 1e-06 to 0.01667*",
+    "{'noslip_iterations': 1.5}": ": mujoco.noslip_iterations=1.5: give a whole number",
+    "{'solref': 3}": ": mujoco.solref=3: give 2 numbers, separated by '/'",
+    "{'cone': 3}": ": mujoco.cone=3: choose from pyramidal, elliptic",
+    "[1]": " gives *1*; it must give a dict of settings by name*",
+    "None": " gives None; it must give a dict of settings by name*",
+    "'timestep=0.1'": " gives 'timestep=0.1'; it must give a dict of settings by name*",
+}
+"""What the fixture `sim_settings` gives, and what is said of it."""
+
+
+def test_wrong_arguments_and_settings(pytester: pytest.Pytester) -> None:
+    calls = [
+        f"def test_{number}({call.partition('(')[0]}):\n    {call}\n"
+        for number, call in enumerate(TESTS)
+    ]
+    classes = [
+        f"class Test{number}:\n"
+        f"    @pytest.fixture\n    def sim_settings(self):\n        return {value}\n\n"
+        "    def test_it(self, repeat):\n        repeat(Falling())\n"
+        for number, value in enumerate(SETTINGS)
+    ]
+    pytester.makepyfile("\n".join([HEAD, *calls, *classes]))
+    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=out")
+    result.assert_outcomes(failed=len(TESTS), errors=len(SETTINGS))
+    settings = [f"the fixture sim_settings{message}" for message in SETTINGS.values()]
+    result.stdout.fnmatch_lines([*settings, *(f"{message}*" for message in TESTS.values())])
     no_traceback(result)
     assert "Error:" not in result.stdout.str() + result.stderr.str()
-
-
-def test_wrong_arguments(pytester: pytest.Pytester) -> None:
-    calls = "".join(
-        f"def test_{number}({call.partition('(')[0]}):\n    {call}\n\n"
-        for number, call in enumerate(TESTS)
-    )
-    pytester.makepyfile(HEAD + calls)
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=out")
-    result.assert_outcomes(failed=len(TESTS))
-    result.stdout.fnmatch_lines([f"{message}*" for message in TESTS.values()])
-    no_error(result)
     assert not (pytester.path / "out").exists()
 
 
-def test_one_task_twice_in_a_test(pytester: pytest.Pytester) -> None:
+def test_one_task_twice_in_a_test_and_good_settings(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         HEAD
         + """
+import numpy as np
+
 def test_twice(repeat):
     repeat(Falling(duration=0.1))
     repeat(Falling(duration=0.1))
@@ -63,64 +85,19 @@ def test_twice(repeat):
 def test_two_tasks(repeat):
     repeat(Falling())
     repeat(Other())
+
+class TestSettings:
+    @pytest.fixture
+    def sim_settings(self):
+        return {"timestep": np.float32(0.01), "noslip_iterations": np.int64(3), "solref": [0.01, 1]}
+
+    def test_it(self, repeat):
+        settings = repeat(Falling()).records[0].settings
+        assert settings["timestep"] == pytest.approx(0.01)
+        assert settings["noslip_iterations"] == 3
 """
     )
     result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=1")
-    result.assert_outcomes(failed=1, passed=1)
+    result.assert_outcomes(failed=1, passed=2)
     result.stdout.fnmatch_lines(["repeat() is called for the task 'falling' a second time in one*"])
-    no_error(result)
-
-
-SETTINGS = {
-    "{'speed': 1}": "mujoco has no setting 'speed'; choose from timestep=*",
-    "{3: 1}": "mujoco has no setting 3; choose from timestep=*",
-    "{'timestep': 'fast'}": "mujoco.timestep=fast: give a finite number",
-    "{'timestep': None}": "mujoco.timestep=None: give a finite number",
-    "{'timestep': float('inf')}": "mujoco.timestep=inf: give a finite number",
-    "{'timestep': 5}": "mujoco.timestep=5: give a number of seconds from 1e-06 to 0.01667*",
-    "{'noslip_iterations': 1.5}": "mujoco.noslip_iterations=1.5: give a whole number",
-    "{'solref': 3}": "mujoco.solref=3: give 2 numbers, separated by '/'",
-    "{'cone': 3}": "mujoco.cone=3: choose from pyramidal, elliptic",
-}
-
-
-def test_wrong_settings(pytester: pytest.Pytester) -> None:
-    given = [*SETTINGS, "[1]", "None", "'timestep=0.1'"]
-    parts = [
-        f"class Test{number}:\n"
-        f"    @pytest.fixture\n    def sim_settings(self):\n        return {value}\n\n"
-        "    def test_it(self, repeat):\n        repeat(Falling())\n"
-        for number, value in enumerate(given)
-    ]
-    pytester.makepyfile(HEAD + "\n".join(parts))
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=out")
-    result.assert_outcomes(errors=len(given))
-    result.stdout.fnmatch_lines(
-        [
-            *(f"the fixture sim_settings: {message}" for message in SETTINGS.values()),
-            "the fixture sim_settings gives *1*; it must give a dict of settings by name*",
-            "the fixture sim_settings gives None; it must give a dict of settings by name*",
-            "the fixture sim_settings gives *; it must give a dict of settings by name*",
-        ]
-    )
-    no_error(result)
-    assert not (pytester.path / "out").exists()
-
-
-def test_good_settings_are_taken(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        HEAD
-        + """
-import numpy as np
-
-@pytest.fixture
-def sim_settings():
-    return {"timestep": np.float32(0.01), "noslip_iterations": np.int64(3), "solref": [0.01, 1]}
-
-def test_it(repeat):
-    settings = repeat(Falling()).records[0].settings
-    assert settings["timestep"] == pytest.approx(0.01)
-    assert settings["noslip_iterations"] == 3
-"""
-    )
-    pytester.runpytest_subprocess("--sim=mujoco", "--reps=1").assert_outcomes(passed=1)
+    no_traceback(result)

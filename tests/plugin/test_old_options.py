@@ -6,8 +6,6 @@ import pytest
 
 from pytest_simbench.cli import main
 from pytest_simbench.plugin import old_options
-from pytest_simbench.report.markdown.capabilities import capability_markdown
-from pytest_simbench.simulator.registry import adapter, registered
 from tests.cli.command import simbench
 from tests.plugin.inner import FALLING, distribution, importable, usage_error
 
@@ -84,8 +82,3 @@ def test_an_untested_version_runs_and_is_named(
     result.stdout.fnmatch_lines(
         ["newer: *", "*UNTESTED*", "unlisted: *", "    version not known before it runs, installed"]
     )
-
-
-def test_the_page_of_the_documentation_is_up_to_date(request: pytest.FixtureRequest) -> None:
-    page = (request.config.rootpath / "docs" / "simulators.md").read_text("utf-8")
-    assert capability_markdown([adapter(name).info for name in registered()]) in page

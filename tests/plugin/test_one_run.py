@@ -196,20 +196,3 @@ def test_a_folder_deleted_while_running_loses_no_record(pytester: pytest.Pyteste
     result.assert_outcomes(passed=1)
     result.stdout.fnmatch_lines(["*task.duration=0.1*", "*task.duration=0.2*"])
     assert len(records(pytester.path / "o")) == 1
-
-
-@pytest.mark.parametrize("name", ["a/b", "..", "a b", "Ünï", "x" * 300, "falling/../../up"])
-def test_any_name_of_a_task_has_its_report(name: str, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
-    from pytest_simbench.report.files import write_files
-    from pytest_simbench.report.model.report import Report
-    from pytest_simbench.report.model.summary import summarise
-    from tests.report.samples import record
-
-    folder = tmp_path / "run"
-    found = [record(task=name, metrics={"placed": k / 9}, repetition=k) for k in (1, 2)]
-    found += [record(task=name.swapcase() + "'", metrics={"placed": 0.1})]
-    written = write_files(folder, Report(summarise(found, {}), found))
-    assert written.complete
-    assert len(list(folder.glob("*.png"))) == 6
-    assert list(tmp_path.iterdir()) == [folder]

@@ -207,9 +207,8 @@ def test_help_shows_an_option_once_and_no_old_one(pytester: pytest.Pytester) -> 
 
 @pytest.mark.parametrize(
     "command",
-    ["--help", "--markers", "--fixtures-per-test", "--version", "--setup-plan",
-     "--trace-config --collect-only"],
-)  # fmt: skip
+    ["--markers", "--fixtures-per-test", "--setup-plan", "--trace-config --collect-only"],
+)
 def test_informational_commands(pytester: pytest.Pytester, command: str) -> None:
     pytester.makepyfile("def test_it(repeat):\n    pass\n")
     result = pytester.runpytest_subprocess(*command.split())

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from pytest_simbench.plugin import options
 from tests.plugin.inner import usage_error
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "pytest9.md"
@@ -49,8 +50,8 @@ def test_the_settings_of_the_page_with_strict(pytester: pytest.Pytester) -> None
 @pytest.mark.parametrize(("name", "value"), [("sim_reps", "20"), ("sim", '"mujoco"')])
 def test_another_type_is_one_sentence(pytester: pytest.Pytester, name: str, value: str) -> None:
     Path("pytest.toml").write_text(settings(**{name: value}))
-    result = pytester.runpytest_subprocess()
-    usage_error(result, f"ERROR: the ini option {name}: * expects a *")
+    with pytest.raises(pytest.UsageError, match=rf"^the ini option {name}: .* expects a "):
+        options.values(pytester.parseconfig())
 
 
 @typed

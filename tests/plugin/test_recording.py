@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
+from pytest_simbench.cli.runs import recordings
 from pytest_simbench.recordings.trace import Trace
 from tests.cli.command import simbench
+from tests.report.samples import record
 
 TEST = """
     import pytest
@@ -74,11 +76,10 @@ def test_a_kept_run_is_recorded_later(pytester: pytest.Pytester) -> None:
     assert (first / "metadata.yaml").stat().st_mtime_ns == written
 
 
-def test_a_run_without_traces_says_so(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
-    pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=o", "--sim-trace=off")
-    result = simbench(pytester, "report", "o", "--record=mcap")
-    result.stdout.fnmatch_lines(["no recordings: the run has no traces; see --sim-trace"])
+def test_a_run_without_traces_says_so(tmp_path: Path) -> None:
+    assert recordings(tmp_path, tmp_path, [record()]) == [
+        "no recordings: the run has no traces; see --sim-trace"
+    ]
 
 
 @pytest.mark.usefixtures("drawn")

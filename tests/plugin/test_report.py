@@ -8,13 +8,10 @@ import re
 
 import pytest
 
+from pytest_simbench.plugin.benchmark import shown
+from pytest_simbench.records.baseline import KEY
 from tests.cli.command import simbench
 from tests.plugin.inner import FALLING
-
-OTHER = """
-    def test_sum(benchmark):
-        assert benchmark(sum, [1, 2]) == 3
-"""
 
 
 def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
@@ -83,7 +80,7 @@ def test_everything_is_told_with_v_and_a_badge_that_cannot_be_written(
     assert output.index("declared deviations") < output.index("\nreport: ")
 
 
-@pytest.mark.parametrize("where", ["command line", "ini", "environment"])
+@pytest.mark.parametrize("where", ["command line", "ini", "environment", ""])
 def test_the_table_of_pytest_benchmark_comes_with_one_of_its_options(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
@@ -92,17 +89,9 @@ def test_the_table_of_pytest_benchmark_comes_with_one_of_its_options(
         pytester.makeini(f"[pytest]\naddopts = {option}")
     if where == "environment":
         monkeypatch.setenv("PYTEST_ADDOPTS", option)
-    result = run(pytester, *[option] * (where == "command line"))
-    result.stdout.fnmatch_lines(["*benchmark 'test_falling': 1 tests*", "test_falling*mujoco*"])
-
-
-def test_benchmarks_of_others_keep_their_table(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(test_it=FALLING, test_other=OTHER)
-    result = run(pytester)
-    result.assert_outcomes(passed=2)
-    table = result.stdout.str().partition("- benchmark")[2].partition("Legend")[0]
-    assert "test_sum" in table
-    assert "test_falling" not in table
+    config = pytester.parseconfig(*[option] * (where == "command line"))
+    groups = [("test_falling", [{"extra_info": {KEY: {}}}]), ("sum", [{"extra_info": {}}])]
+    assert shown(config, groups) == (groups if where else groups[1:])
 
 
 @pytest.mark.usefixtures("drawn")

@@ -13,7 +13,6 @@ import numpy as np
 import psutil
 import pytest
 
-from pytest_simbench.records.folder import RunFolder
 from tests.plugin.inner import CLAIMING, FALLING, records
 
 
@@ -192,20 +191,6 @@ def test_interrupt_prints_the_table_and_keeps_the_records(
     assert not alive
 
 
-def test_a_run_that_x_stops_has_its_result(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        CLAIMING
-        + """
-def test_impossible(repeat):
-    repeat(Falling()).assert_at_most("landed", -1.0)
-"""
-    )
-    arguments = ["--sim=mujoco,pybullet", "--reps=1", "-k", "impossible"]
-    result = pytester.runpytest_subprocess(*arguments, "-x")
-    result.assert_outcomes(failed=1, deselected=2)
-    result.stdout.fnmatch_lines(["*simulator comparison*"])
-
-
 @pytest.mark.usefixtures("drawn")
 def test_plugin_load_is_light(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
@@ -260,33 +245,3 @@ def test_declared_deviations_are_recorded_and_shown(pytester: pytest.Pytester) -
     for name, texts in TOLD.items():
         assert set(texts) <= set(recorded[name])
         assert all(f"{name}: {' '.join(text.split())}" in page for text in texts)
-
-
-VERSIONS = """
-from dataclasses import dataclass, replace
-from tests.tiny import Falling
-
-@dataclass(frozen=True)
-class Versions(Falling):
-    def smoke(self):
-        return replace(self, duration=0.2)
-    def study(self):
-        return replace(self, duration=0.4)
-
-def test_versions(repeat):
-    repeat(Versions())
-"""
-
-
-@pytest.mark.parametrize(("protocol", "duration"), [("fast", 0.6), ("smoke", 0.2), ("paper", 0.4)])
-def test_the_protocols_version_is_run(
-    pytester: pytest.Pytester, protocol: str, duration: float
-) -> None:
-    pytester.makepyfile(VERSIONS)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=1", f"--protocol={protocol}", "--sim-output=out"
-    )
-    result.assert_outcomes(passed=1)
-    (record,) = RunFolder(pytester.path / "out").read().records
-    assert record.settings["task.duration"] == duration
-    assert record.stepping["simulated"] == pytest.approx(duration)

@@ -28,7 +28,9 @@ import make_truth  # noqa: E402
 import published_runs  # noqa: E402
 import tables  # noqa: E402
 
-SITE = [path for path in DOCS.rglob("*.md") if not {"_build", "data"} & {*path.parts}]
+SITE = [
+    path for path in DOCS.rglob("*.md") if not {"_build", "data"} & {*path.relative_to(DOCS).parts}
+]
 MARKS = [(path, words) for path in SITE for words in made.MARK.findall(path.read_text("utf-8"))]
 
 

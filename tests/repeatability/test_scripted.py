@@ -16,7 +16,6 @@ import pytest
 
 from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.errors import Where, WorkerError, WorkerExited
-from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.records.checked import convert
 from pytest_simbench.records.repeatability import Again
 from pytest_simbench.repeatability.episode import Episode, changed
@@ -32,7 +31,6 @@ from pytest_simbench.repeatability.search import (
     search,
     to_wire,
 )
-from pytest_simbench.repeatability.stability import Stability
 from pytest_simbench.tasks import Jitter, Stacking, Throwing
 from pytest_simbench.tasks.base import Outcome
 from tests.repeatability.scripted import Scripted, episode, motion, operation
@@ -348,9 +346,3 @@ def test_the_smallest_is_kept_as_an_example(
 
     crash = search(Scripted(crashing), {"x": 2e-3}, examples=40, at_once=1)
     assert (crash.effect, crash.replay) == ("ends in WorkerExited", "")
-
-
-def test_what_is_not_judged_warns_at_the_line_of_the_test() -> None:
-    with pytest.warns(InconclusiveWarning, match="not judged") as caught:
-        Stability("sim", [1.0] * 4, 4, "1 mm in x", "").assert_kept_at_least(0.9)
-    assert caught[0].filename == __file__

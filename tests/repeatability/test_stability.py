@@ -154,5 +154,6 @@ def test_what_is_not_decided_warns_or_fails_if_strict() -> None:
         found.assert_kept_at_least(0.9)
     with pytest.raises(AssertionError, match=r"inconclusive: kept 100 % .*\(--sim-strict\)"):
         replace(found, strict=True).assert_kept_at_least(0.9)
-    with pytest.warns(InconclusiveWarning, match="not judged: .*a claim needs 5 repetitions"):
+    with pytest.warns(InconclusiveWarning, match="not judged: .*a claim needs 5 rep") as caught:
         Stability("sim", [0.0] * 4, 0, "1 mm in x", "").assert_kept_at_least(0.9)
+    assert caught[0].filename == __file__

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from pytest_simbench.recordings.film import Album
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.figures import front, sweep
-from pytest_simbench.report.figures.drawing import FiguresUnavailable, drawing, write
+from pytest_simbench.report.figures.drawing import FiguresUnavailable, Picture, drawing, write
 from pytest_simbench.report.figures.history import FAILS, NOT_ASKED, draw_laws
 from pytest_simbench.report.figures.sheet import sheet_name, sheets
 from pytest_simbench.report.figures.task import draw, pictures
@@ -89,16 +90,17 @@ def test_without_matplotlib_one_line_says_so(
 def test_a_fault_of_the_drawing_costs_the_pictures_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def broken(*_: object) -> list[Path]:
-        raise ValueError("no logarithm")
+    def broken(*_: object) -> Iterator[Picture]:
+        yield Picture("x", lambda: 1 / 0)
 
     monkeypatch.setattr(sweep, "pictures", broken)
     records = throwing_run()
     written = write_files(tmp_path, Report(summarise(records, METRICS), records))
-    assert written.problems == ["the pictures could not be drawn: ValueError: no logarithm"]
+    (told,) = written.problems
+    assert told == "the pictures could not be drawn: ZeroDivisionError: division by zero"
     assert not written.complete
     assert (tmp_path / "report.md").exists()
-    assert (tmp_path / "report.html").exists()
+    assert told in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_one_picture_for_all_laws_over_releases_and_its_colours(tmp_path: Path) -> None:

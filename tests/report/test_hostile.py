@@ -14,10 +14,10 @@ from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.repeatability import Line
 from pytest_simbench.report.files import csv_of, write_files
 from pytest_simbench.report.markdown.capabilities import capability_markdown
-from pytest_simbench.report.markdown.run import render_changes as changes_in_markdown
 from pytest_simbench.report.markdown.run import render_run as markdown
+from pytest_simbench.report.markdown.run import render_section
 from pytest_simbench.report.markdown.run import render_tables as tables_in_markdown
-from pytest_simbench.report.model import repeatability
+from pytest_simbench.report.model import changes, repeatability
 from pytest_simbench.report.model.capabilities import columns
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import TaskSummary, summarise
@@ -120,7 +120,7 @@ def test_the_comparison_with_a_baseline(text: str) -> None:
     now = [replace(r, versions={text: "2"}, settings={text: 1}) for r in records(text)]
     report = run_gate(records(text), now, (), declared(text))
     assert_harmless_terminal(render_changes(report, 100, True))
-    assert_harmless_markdown(changes_in_markdown(report, text, True))
+    assert_harmless_markdown(render_section(changes.section(text, report)))
 
 
 @texts

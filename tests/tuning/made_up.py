@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pytest_simbench.cli.runs import printed
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.identity import record_of, settings, versions
-from pytest_simbench.experiment.repetition import Ended, Hooks
+from pytest_simbench.experiment.identity import settings
 from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Failure
-from pytest_simbench.tuning.runs import Runs
 from pytest_simbench.tuning.target import Look, Target
-from pytest_simbench.tuning.trials import Trials
+from pytest_simbench.tuning.trials import Runs, Trials
+from tests.made_up import MadeUp
 from tests.tiny import Falling
 
 Score = Callable[[Mapping[str, Any], int], float | None]
@@ -27,46 +24,26 @@ Score = Callable[[Mapping[str, Any], int], float | None]
 LANDED = Falling().metrics[0]
 
 
-@dataclass(eq=False)
-class Repetition:
-    executor: MadeUp
-    experiment: Experiment
-    number: int
-    hooks: Hooks
+class Scored(MadeUp):
+    """Repetitions that cost and score what the settings say.
 
-    def run(self) -> Ended:
-        self.hooks.begin("")
-        found = settings(self.experiment.case)
-        self.executor.asked.append((self.experiment.case.variant, self.number))
-        score = self.executor.score(found, self.number)
-        record = record_of(
-            self.experiment,
-            self.number,
-            status="failed" if score is None else "ok",
-            settings=found,
-            versions=versions(self.experiment.case),
-            error=None if score is not None else Failure("WorkerHung", "it hangs", "fall"),
-            metrics={"landed": score},
-            seconds={"total": 1.0},
-            stepping={"cpu": 1e-5 / found["timestep"], "simulated": 1.0},
-        )
-        return record, None
-
-    def kill(self) -> None:
-        """Nothing runs."""
-
-
-class MadeUp(Executor):
-    jobs = 1
+    Attributes:
+        asked: variant and number of each.
+    """
 
     def __init__(self, score: Score, jobs: int = 1) -> None:
-        self.score, self.jobs = score, jobs
+        super().__init__(jobs, self._ended)
+        self.score = score
         self.asked: list[tuple[str, int]] = []
 
-    def repetition(
-        self, experiment: Experiment, number: int, hooks: Hooks | None = None
-    ) -> Repetition:
-        return Repetition(self, experiment, number, hooks or Hooks())
+    def _ended(self, experiment: Experiment, number: int) -> tuple[dict[str, Any], None]:
+        found = settings(experiment.case)
+        self.asked.append((experiment.case.variant, number))
+        score = self.score(found, number)
+        told = {"metrics": {"landed": score}, "status": "failed" if score is None else "ok"}
+        error = None if score is not None else Failure("WorkerHung", "it hangs", "fall")
+        stepping = {"cpu": 1e-5 / found["timestep"], "simulated": 1.0}
+        return {**told, "error": error, "stepping": stepping}, None
 
 
 def target(chosen: int = 4, judged: int = 6) -> Target:
@@ -76,9 +53,9 @@ def target(chosen: int = 4, judged: int = 6) -> Target:
 
 def trials(
     folder: Path, score: Score, of: Target | None = None, jobs: int = 1
-) -> tuple[Trials, MadeUp]:
+) -> tuple[Trials, Scored]:
     """On MuJoCo's default settings, of 2 ms; a folder that holds a run is gone on with."""
-    executor, place = MadeUp(score, jobs), RunFolder(folder)
+    executor, place = Scored(score, jobs), RunFolder(folder)
     place.lock()
     resumed = Resumed(place) if place.holds_run else None
     case = Case.of("mujoco", profile="default", test="t", mode="headless", folder=folder)

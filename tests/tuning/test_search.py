@@ -15,7 +15,7 @@ from pytest_simbench.tuning.search import Search, front, space_of
 from pytest_simbench.tuning.target import FAILED, TuningError
 from pytest_simbench.tuning.trials import Candidate
 
-from .made_up import MadeUp, Score, trials
+from .made_up import Score, Scored, trials
 
 BASE = adapter("mujoco").profiles["default"]
 
@@ -25,7 +25,7 @@ def score(settings: Any, number: int) -> float:
     return float(settings["timestep"] <= 0.004 and settings["cone"] == "elliptic")
 
 
-def search(folder: Path, score: Score = score, seed: int = 1) -> tuple[Search, MadeUp]:
+def search(folder: Path, score: Score = score, seed: int = 1) -> tuple[Search, Scored]:
     looks, executor = trials(folder, score)
     space = space_of(BASE, ["timestep", "cone"], "mujoco")
     return Search(looks, BASE, space, seed, lambda one, best: None), executor

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,13 +37,24 @@ class FiguresUnavailable(RuntimeError):
     """Pictures cannot be drawn here; the message says what to install."""
 
 
-Named = Iterator[tuple[str, Any]]
-"""Pictures as a `matplotlib.figure.Figure` each, with the names of their files without ending."""
+@dataclass(frozen=True)
+class Picture:
+    """A picture that is not drawn yet.
+
+    Attributes:
+        name: of its file, without ending.
+        draw: makes it within `drawing`, a `matplotlib.figure.Figure`; None where there is nothing
+            to draw.
+        caption: what it shows, for the page; empty of one that the page has not.
+    """
+
+    name: str
+    draw: Callable[[], Any]
+    caption: str = ""
 
 
-def write(folder: Path, pictures: Iterable[tuple[str, Any]]) -> list[Path]:
-    """Draw pictures, which may wait for that, as PNG files in `folder`, each whole or not at all,
-    and return their paths.
+def write(folder: Path, pictures: Iterable[Picture]) -> list[Path]:
+    """Draw pictures as PNG files in `folder`, each whole or not at all, and return their paths.
 
     Raises:
         FiguresUnavailable: matplotlib is not installed.
@@ -50,11 +62,12 @@ def write(folder: Path, pictures: Iterable[tuple[str, Any]]) -> list[Path]:
     """
     paths = []
     with drawing():
-        for name, figure in pictures:
-            picture = io.BytesIO()
-            figure.savefig(picture, format="png", dpi=DPI)
-            write_whole(folder, f"{name}.png", picture.getvalue())
-            paths.append(folder / f"{name}.png")
+        for picture in pictures:
+            if (figure := picture.draw()) is not None:
+                drawn, name = io.BytesIO(), f"{picture.name}.png"
+                figure.savefig(drawn, format="png", dpi=DPI)
+                write_whole(folder, name, drawn.getvalue())
+                paths.append(folder / name)
     return paths
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from pytest_simbench.ground.names import file_name
@@ -18,7 +19,7 @@ from pytest_simbench.measure.history import (
 )
 from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
-from pytest_simbench.report.figures.drawing import COLOURS, Named, heading, panelled
+from pytest_simbench.report.figures.drawing import COLOURS, Picture, heading, panelled
 
 SHOWN = 6
 """Panels of a picture at most: those that changed come first."""
@@ -38,16 +39,16 @@ ROW = 0.17
 """Height of a law [in]."""
 
 
-def pictures(found: Sequence[History]) -> Named:
+def pictures(found: Sequence[History]) -> Iterator[Picture]:
     """Each history, `SIMULATOR_TASK_history`."""
     for history in found:
         name = file_name(
             f"{history.simulator}_{history.task}_history", history.test, history.variant
         )
         if isinstance(history, LawHistory):
-            yield name, draw_laws(history)
+            yield Picture(name, partial(draw_laws, history))
         elif isinstance(history, TaskHistory):
-            yield name, draw(history)
+            yield Picture(name, partial(draw, history))
 
 
 def draw(history: TaskHistory) -> Any:

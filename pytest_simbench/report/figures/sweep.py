@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
 from pytest_simbench.measure.sweep import Point, Swept
-from pytest_simbench.report.figures.drawing import Named, line_style, plain_ticks
+from pytest_simbench.report.figures.drawing import Picture, line_style, plain_ticks
 from pytest_simbench.report.model.sweep import labels, phenomena
 
 WIDE = 4
@@ -22,12 +23,13 @@ OVER = {"step": "time step [ms]", "cost": "CPU s for a simulated s"}
 """What pictures show the error over, with the label of the axis."""
 
 
-def pictures(found: Sequence[Swept]) -> Named:
+def pictures(found: Sequence[Swept]) -> Iterator[Picture]:
     """Two of each phenomenon, `sweep_PHENOMENON_step` and `..._cost`."""
     for phenomenon in phenomena(found):
         for over in OVER:
             name = file_name(f"sweep_{phenomenon.replace(' ', '_')}_{over}")
-            yield name, draw(found, phenomenon, over)
+            drawn = partial(draw, found, phenomenon, over)
+            yield Picture(name, drawn, caption(phenomenon, over))
 
 
 def draw(found: Sequence[Swept], phenomenon: str, over: str) -> Any:

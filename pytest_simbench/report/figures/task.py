@@ -3,22 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
-from pytest_simbench.report.figures.drawing import COLOURS, Named, heading, line_style, panelled
+from pytest_simbench.report.figures.drawing import COLOURS, Picture, heading, line_style, panelled
 from pytest_simbench.report.model.pooling import merged_order
 from pytest_simbench.report.model.summary import Row, TaskSummary, short_labels
 
+ON_PAGE = {
+    "times": "Start and end of the task: mean and deviation",
+    "phases": "CPU and RAM along the phases of the task: means over all samples",
+}
+"""Pictures that the page has of a task, and their captions."""
 
-def pictures(summaries: Sequence[TaskSummary]) -> Named:
-    """All pictures of a run, `TASK_NAME`."""
+
+def pictures(summaries: Sequence[TaskSummary]) -> Iterator[Picture]:
+    """Those that a run folder holds, `TASK_NAME`."""
     for summary in summaries:
         for name in PICTURES:
-            if (figure := draw(summary, name)) is not None:
-                yield f"{file_name(summary.task)}_{name}", figure
+            yield Picture(f"{file_name(summary.task)}_{name}", partial(draw, summary, name))
+
+
+def on_page(summary: TaskSummary) -> Iterator[Picture]:
+    """Those of a task on the page, which have captions in place of titles."""
+    for name, caption in ON_PAGE.items():
+        drawn = partial(draw, summary, name, titled=False)
+        yield Picture(f"{file_name(summary.task)}_{name}", drawn, caption)
 
 
 def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
 from pytest_simbench.measure.transfer import Transfer
-from pytest_simbench.report.figures.drawing import Named
+from pytest_simbench.report.figures.drawing import Picture
 from pytest_simbench.report.model.document import names
 from pytest_simbench.report.model.transfer import interval
 
 CAPTION = "tau-b between simulators; on the diagonal each against itself on other seeds"
 
 
-def pictures(found: Sequence[Transfer]) -> Named:
+def pictures(found: Sequence[Transfer]) -> Iterator[Picture]:
     """One of each, `transfer_TASK`; a task that is asked for otherwise has a number."""
     for place, one in enumerate(found):
-        yield file_name(f"transfer_{one.task}{place or ''}"), draw(one)
+        name = file_name(f"transfer_{one.task}{place or ''}")
+        yield Picture(name, partial(draw, one), CAPTION)
 
 
 def draw(found: Transfer) -> Any:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pytest_simbench.report.markdown.run import table
 from pytest_simbench.report.model.capabilities import columns
 from pytest_simbench.simulator.info import SimulatorInfo
+from pytest_simbench.simulator.registry import adapter, registered
 
 
 def capability_markdown(infos: Sequence[SimulatorInfo]) -> str:
@@ -14,12 +15,6 @@ def capability_markdown(infos: Sequence[SimulatorInfo]) -> str:
     return table(columns(infos))
 
 
-def main() -> None:
-    """Print the table of all registered simulators."""
-    from pytest_simbench.simulator.registry import adapter, registered
-
-    print(capability_markdown([adapter(name).info for name in registered()]))
-
-
-if __name__ == "__main__":
-    main()
+def all_capabilities() -> str:
+    """The table of all registered simulators."""
+    return capability_markdown([adapter(name).info for name in registered()])

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from pytest_simbench.ground.text import for_markdown, in_one_line
-from pytest_simbench.measure.gate import GateReport
-from pytest_simbench.report.model import changes, tables
+from pytest_simbench.report.model import tables
 from pytest_simbench.report.model.claims import Claims
 from pytest_simbench.report.model.document import Column, Section, Table, capital
 from pytest_simbench.report.model.report import Report
@@ -54,20 +53,6 @@ def render_section(found: Section, level: int = 2) -> str:
         parts += _titled(each, level + 1 if place else 0)
     parts.append(_bullets(f"note: {text}" for text in found.notes))
     return "\n\n".join(filter(None, parts))
-
-
-def render_changes(report: GateReport, baseline: str, limited: bool) -> str:
-    """The comparison with a baseline, for the page of a CI job; ends with a newline."""
-    passed = changes.passed(report) if limited else ""
-    parts = [
-        f"## {for_markdown(f'Compared with {baseline}')}",
-        _bullets(changes.warned(report)),
-        _bullets(changes.failed(report)),
-        f"Passed: {passed}." if passed else "",
-        table(changes.columns(report)),
-        _bullets(f"not compared: {sentence}" for sentence in report.notes),
-    ]
-    return "\n\n".join(filter(None, parts)) + "\n"
 
 
 def render_tables(title: str, found: Sequence[Table]) -> str:

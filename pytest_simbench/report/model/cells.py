@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from pytest_simbench.measure.intervals import proportion
 from pytest_simbench.records.metrics import Metric, significant
 from pytest_simbench.report.model.document import Cell
@@ -14,6 +16,11 @@ MISSING = "-"
 def number(value: float, digits: int = 3) -> str:
     """So many significant digits, zeros kept: 1.35, 0.80, 161."""
     return significant(value, digits, keep_zeros=True)
+
+
+def two_decimals(value: float) -> str:
+    """No minus before a zero, and `MISSING` for what is no number."""
+    return MISSING if math.isnan(value) else f"{value:.2f}".replace("-0.00", "0.00")
 
 
 def metric_value(value: float, metric: Metric) -> str:

@@ -14,9 +14,9 @@ PASSED = "no metric got worse beyond its limit"
 NO_LIMIT = "not significantly more repetitions crashed; no other limit was tested"
 
 
-def columns(report: GateReport | None) -> list[Column]:
+def columns(report: GateReport) -> list[Column]:
     """One line for each metric with a limit, each of the study's, and each that clearly changed."""
-    rows = _rows(report) if report else []
+    rows = _rows(report)
     if not rows:
         return []
     found = [change for change, _ in rows]
@@ -78,29 +78,19 @@ def _amount(change: Change) -> str:
     return f"{'+' if rising else '-'}{text}" if change.loss else "0"
 
 
-def section(name: str, report: GateReport) -> Section:
-    """The whole comparison with the baseline of that name."""
-    verdicts = failed(report) or [passed(report)]
+def section(name: str, report: GateReport, limited: bool = True) -> Section:
+    """The whole comparison with the baseline of that name. Where limits were given, passing is
+    worth a sentence."""
+    verdicts = [f"FAILED {sentence}" for sentence in report.failures]
+    verdicts += [passed(report)] * (limited and not verdicts)
+    warned = [f"{DIFFERENT}: {sentence}" for sentence in report.differences]
     found = columns(report)
-    return Section(
-        f"Compared with {name}",
-        [*verdicts, *warned(report)],
-        [Table("", found)] if found else [],
-        report.notes,
-    )
+    shown = [Table("Changes", found)] if found else []
+    notes = [f"not compared: {sentence}" for sentence in report.notes]
+    return Section(f"Compared with {name}", [*verdicts, *warned], shown, notes)
 
 
 DIFFERENT = "different in the baseline (a change may come from this)"
-
-
-def warned(report: GateReport) -> list[str]:
-    """What is not the same in both runs."""
-    return [f"{DIFFERENT}: {sentence}" for sentence in report.differences]
-
-
-def failed(report: GateReport) -> list[str]:
-    """Why the comparison fails."""
-    return [f"FAILED {sentence}" for sentence in report.failures]
 
 
 def passed(report: GateReport) -> str:

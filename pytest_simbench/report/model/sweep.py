@@ -134,28 +134,22 @@ def labels(found: Sequence[Swept]) -> dict[Who, str]:
 def _choice(found: StepChoice | None) -> list[str]:
     if found is None:
         return [cells.MISSING]
+    kept = f"{found.kept}/{found.laws}"
     if not found.kept:
-        return [f"{found.kept}/{found.laws}"]
-    cost = [] if found.cost is None else [cells.number(found.cost, 2)]
-    return [f"{found.kept}/{found.laws} {step_text(found.step)}", *cost]
+        return [kept]
+    step, *cost = _step(found)
+    return [f"{kept} {step}", *cost]
 
 
-def _step(found: Point | None) -> list[str]:
+def _step(found: Point | StepChoice | None) -> list[str]:
+    """A step and, where it is known, its cost."""
     if found is None:
         return ["none"]
-    cost = [] if found.cost is None else [cells.number(found.cost, 2)]
-    return [step_text(found.step), *cost]
+    return [step_text(found.step), *([] if found.cost is None else [cells.number(found.cost, 2)])]
 
 
 def _order(found: Convergence) -> str:
     if found.kind != "order":
         return found.kind if found.kind != "unknown" else cells.MISSING
-    text = _number(found.order)
-    if math.isfinite(found.low):
-        text += f" [{_number(found.low)}, {_number(found.high)}]"
-    return text
-
-
-def _number(value: float) -> str:
-    """With two decimals, and no minus before a zero."""
-    return f"{value:.2f}".replace("-0.00", "0.00")
+    order, *ends = map(cells.two_decimals, (found.order, found.low, found.high))
+    return f"{order} [{', '.join(ends)}]" if math.isfinite(found.low) else order

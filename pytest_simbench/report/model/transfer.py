@@ -64,7 +64,7 @@ def sentences(found: Transfer) -> list[str]:
     for verdict, head in heads.items():
         pairs = [
             f"{known[i]} and {known[j]} (tau-b {interval(found.tau(i, j))}, ceilings "
-            f"{_number(own[i].tau.mean)} and {_number(own[j].tau.mean)})"
+            f"{cells.two_decimals(own[i].tau.mean)} and {cells.two_decimals(own[j].tau.mean)})"
             for i, j in places.get(verdict, ())
         ]
         told += [f"{head}: {listed(pairs, NAMED)}."] * bool(pairs)
@@ -89,13 +89,8 @@ def _rounded(seeds: int) -> str:
 
 def interval(found: Interval) -> str:
     """Value and ends."""
-    if math.isinf(found.high):
-        return _number(found.mean)
-    return f"{_number(found.mean)} [{_number(found.low)}, {_number(found.high)}]"
-
-
-def _number(value: float) -> str:
-    return cells.MISSING if math.isnan(value) else f"{value:.2f}".replace("-0.00", "0.00")
+    mean, *ends = map(cells.two_decimals, (found.mean, found.low, found.high))
+    return mean if math.isinf(found.high) else f"{mean} [{', '.join(ends)}]"
 
 
 def _simulators(found: Transfer) -> Column:

@@ -11,6 +11,9 @@ from typing import Any
 
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.records.record import Record
+from pytest_simbench.report.figures import sweep as sweep_figures
+from pytest_simbench.report.figures import task as task_figures
+from pytest_simbench.report.figures import transfer as transfer_figures
 from pytest_simbench.report.model import (
     carried,
     cells,
@@ -23,10 +26,10 @@ from pytest_simbench.report.model import (
 )
 from pytest_simbench.report.model.answer import headline
 from pytest_simbench.report.model.claims import command
-from pytest_simbench.report.model.document import Of, Table
+from pytest_simbench.report.model.document import Of
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import Cause, Row, TaskSummary
-from pytest_simbench.report.page.pictures import of_sweeps, of_transfers, pictures
+from pytest_simbench.report.page.pictures import drawn
 from pytest_simbench.report.page.setup import setup
 from pytest_simbench.report.page.strips import strips
 from pytest_simbench.report.replay.recorded import Group, links, videos
@@ -46,11 +49,11 @@ def page(
 ) -> Shown:
     """What the page of a run tells, also of its results on repeatability, of the replay beside it,
     and contact sheets (PNG) by task; `render.render` makes HTML of it."""
-    summaries, tasks, comparison = report.summaries, report.tasks, report.comparison
+    summaries, tasks = report.summaries, report.tasks
     repetitions = _Repetitions(folder, replays)
-    drawn = [pictures(summary) for summary in tasks]
-    swept, problem = of_sweeps(report.sweeps)
-    ranks, _ = of_transfers(report.transfers)
+    of_tasks = [drawn(task_figures.on_page(summary)) for summary in tasks]
+    swept, problem = drawn(sweep_figures.pictures(report.sweeps))
+    ranks, _ = drawn(transfer_figures.pictures(report.transfers))
     transfers = [transfer.section(found) for found in report.transfers]
     again, problems = repeatability.found_in(folder)
     laws = len(truth.laws(summaries))
@@ -66,7 +69,9 @@ def page(
             *headline(tasks),
         ],
         # What could not be shown, each once.
-        "problems": dict.fromkeys(filter(None, [*(why for _, why in drawn), *problems, problem])),
+        "problems": dict.fromkeys(
+            filter(None, [*(why for _, why in of_tasks), *problems, problem])
+        ),
         "filters": {name: found for name, found in choices.items() if len(found) > 1},
         "scenes": report.scenes,
         "transfers": list(zip_longest(transfers, ranks)),
@@ -80,11 +85,10 @@ def page(
                 "pictures": pictures,
                 "sheet": b64encode((sheets or {}).get(summary.task, b"")).decode("ascii"),
             }
-            for summary, (pictures, _) in zip(tasks, drawn, strict=True)
+            for summary, (pictures, _) in zip(tasks, of_tasks, strict=True)
         ],
         "repeatability": again,
-        "comparison": comparison,
-        "changed": Table("Changes", changes.columns(comparison[1] if comparison else None)),
+        "comparison": report.comparison and changes.section(*report.comparison, limited=False),
         "setup": setup(summaries),
         "repetitions": repetitions.shown,
     }

@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 from xml.etree import ElementTree
 
 from pytest_simbench.ground.names import digest
-from pytest_simbench.measure.sweep import Swept
-from pytest_simbench.measure.transfer import Transfer
-from pytest_simbench.report.figures import sweep, transfer
-from pytest_simbench.report.figures.drawing import FiguresUnavailable, drawing
-from pytest_simbench.report.figures.task import draw
-from pytest_simbench.report.model.summary import TaskSummary
-from pytest_simbench.report.model.sweep import phenomena
+from pytest_simbench.report.figures.drawing import FiguresUnavailable, Picture, drawing
+from pytest_simbench.worker.wire import named
 
 SVG = "http://www.w3.org/2000/svg"
 LINK = "http://www.w3.org/1999/xlink"
@@ -24,62 +17,31 @@ LINK = "http://www.w3.org/1999/xlink"
 DROPPED = {f"{{{SVG}}}metadata", f"{{{SVG}}}style"}
 """Who drew it, and a style that would hold for the whole page."""
 
-SHOWN = (
-    ("times", "Start and end of the task: mean and deviation"),
-    ("phases", "CPU and RAM along the phases of the task: means over all samples"),
-)
-
 
 @dataclass(frozen=True)
-class Picture:
+class Drawn:
     """A picture: what it shows, and SVG that is safe in a page."""
 
     caption: str
     svg: str
 
 
-def pictures(summary: TaskSummary) -> tuple[list[Picture], str]:
-    """The pictures of a task; and a sentence where there are none and why."""
-    return _drawn(
-        (caption, (summary.task, name), partial(draw, summary, name, titled=False))
-        for name, caption in SHOWN
-    )
-
-
-def of_sweeps(found: Sequence[Swept]) -> tuple[list[Picture], str]:
-    """The pictures of laws over time steps; and a sentence where there are none and why."""
-    return _drawn(
-        (sweep.caption(of, over), ("sweep", of, over), partial(sweep.draw, found, of, over))
-        for of in phenomena(found)
-        for over in sweep.OVER
-    )
-
-
-def of_transfers(found: Sequence[Transfer]) -> tuple[list[Picture], str]:
-    """The picture of each; and a sentence where there are none and why."""
-    return _drawn(
-        (transfer.CAPTION, ("transfer", str(place)), partial(transfer.draw, one))
-        for place, one in enumerate(found)
-    )
-
-
-def _drawn(
-    wanted: Iterable[tuple[str, tuple[str, ...], Callable[[], Any]]],
-) -> tuple[list[Picture], str]:
-    """Pictures by caption, name and what draws them; and a sentence where there are none and
-    why."""
+def drawn(pictures: Iterable[Picture]) -> tuple[list[Drawn], str]:
+    """The pictures; and a sentence where there are none and why."""
     found = []
     try:
-        for caption, name, draw_it in wanted:
+        for picture in pictures:
             # Names inside a picture are made of this, so that no two pictures share any.
-            with drawing(svg_fonttype="none", svg_hashsalt=digest(*name)):
-                figure = draw_it()
+            with drawing(svg_fonttype="none", svg_hashsalt=digest(picture.name)):
+                figure = picture.draw()
                 if figure is not None:
-                    drawn = io.BytesIO()
-                    figure.savefig(drawn, format="svg", transparent=True)
-                    found.append(Picture(caption, inline(drawn.getvalue())))
+                    file = io.BytesIO()
+                    figure.savefig(file, format="svg", transparent=True)
+                    found.append(Drawn(picture.caption, inline(file.getvalue())))
     except FiguresUnavailable as error:
         return [], str(error)
+    except Exception as error:  # a fault of ours, which costs the pictures and no table
+        return [], f"the pictures could not be drawn: {named(error)}"
     return found, ""
 
 

@@ -10,13 +10,13 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from jinja2 import Environment, FunctionLoader, StrictUndefined
+from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from pytest_simbench import __version__
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.watching import Step
-from pytest_simbench.report.model import changes, watched
+from pytest_simbench.report.model import watched
 from pytest_simbench.report.model.document import Cell, Section, Table, capital
 from pytest_simbench.report.page.context import Shown
 
@@ -33,46 +33,24 @@ SYMBOLS = {"ahead": ("\u25b2", "ahead"), "behind": ("\u25bc", "behind"),
 def render(page: Shown) -> str:
     """The page as one HTML document, without a line that depends on when it was made."""
     style, script = _part("page.css"), _part("page.js")
-    return (
-        _environment()
-        .get_template("page.html")
-        .render(
-            page=page,
-            style=Markup(style),
-            script=Markup(script),
-            # No other script runs, whatever a text smuggled in; nothing is loaded.
-            policy=f"default-src 'none'; script-src 'sha256-{_digest(script)}'; "
-            "style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'",
-            symbols=SYMBOLS,
-            capital=capital,
-            rows=_rows,
-            failed=changes.failed,
-            warned=changes.warned,
-            svg=lambda picture: Markup(picture.svg),
-            log_link=lambda log: log if _LOG.fullmatch(log) else "",
-            version=__version__,
-        )
+    # No other script runs, whatever a text smuggled in; nothing is loaded.
+    policy = (
+        f"default-src 'none'; script-src 'sha256-{_digest(script)}'; style-src 'unsafe-inline'; "
+        "img-src data:; base-uri 'none'; form-action 'none'"
     )
+    given = {"style": Markup(style), "script": Markup(script), "policy": policy}
+    return _template("page.html").render(page=page, **given)
 
 
 def fragment(sections: Sequence[Section]) -> str:
     """Sections as a part of somebody else's page, a notebook's for instance."""
-    template = _environment().get_template("sections.html")
-    return template.render(sections=sections, rows=_rows, symbols=SYMBOLS, capital=capital)
+    return _template("sections.html").render(sections=sections)
 
 
 def render_watch(steps: Sequence[Step], sentences: Sequence[str]) -> str:
     """The page of a watch: its steps, and what its last run did."""
-    return (
-        _environment()
-        .get_template("watch.html")
-        .render(
-            told=watched.section(steps, sentences),
-            steps=steps,
-            style=Markup(_part("page.css")),
-            version=__version__,
-        )
-    )
+    told, style = watched.section(steps, sentences), Markup(_part("page.css"))
+    return _template("watch.html").render(told=told, steps=steps, style=style)
 
 
 def _rows(found: Table) -> list[tuple[Cell, ...]]:
@@ -83,8 +61,9 @@ def _rows(found: Table) -> list[tuple[Cell, ...]]:
 
 
 @cache
-def _environment() -> Environment:
-    return Environment(
+def _template(name: str) -> Template:
+    """A template, with what all of them may call."""
+    environment = Environment(
         loader=FunctionLoader(_part),
         autoescape=True,
         finalize=_text,
@@ -92,6 +71,15 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.globals.update(
+        symbols=SYMBOLS,
+        capital=capital,
+        rows=_rows,
+        svg=lambda picture: Markup(picture.svg),
+        log_link=lambda log: log if _LOG.fullmatch(log) else "",
+        version=__version__,
+    )
+    return environment.get_template(name)
 
 
 def _part(name: str) -> str:
@@ -101,9 +89,8 @@ def _part(name: str) -> str:
 
 def _text(value: Any) -> Any:
     """Texts lose what is not to be seen; what was made safe on purpose stays as it is."""
-    return (
-        for_terminal(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
-    )
+    plain = isinstance(value, str) and not hasattr(value, "__html__")
+    return for_terminal(value) if plain else value
 
 
 def _digest(script: str) -> str:

@@ -98,7 +98,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without matplotlib's pictures, which take seconds each."""
-    monkeypatch.setattr(context, "pictures", lambda summary: ([], ""))
+    monkeypatch.setattr(context, "drawn", lambda pictures: ([], ""))
 
 
 def test_nothing_is_loaded_from_anywhere(plain: str) -> None:

@@ -31,7 +31,7 @@ def made(records: list[Record], folder: Path) -> Shown:
 @pytest.fixture(autouse=True)
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without matplotlib's pictures, which take seconds each."""
-    monkeypatch.setattr(context, "pictures", lambda summary: ([], ""))
+    monkeypatch.setattr(context, "drawn", lambda pictures: ([], ""))
 
 
 def test_cells_tell_mean_interval_and_ends_and_sort_by_the_mean() -> None:
