@@ -118,8 +118,10 @@ def test_what_comes_to_rest_later_is_waited_for_until_then() -> None:
 def test_no_count_changes_where_the_motion_keeps_within_what_it_was_carried_on_to(
     speed: float, more: float, less: float, at: float, seconds: float
 ) -> None:
-    """A speed that grows no more than evenly, or dies away, changes no count after the end."""
-    path = lambda t: (speed + np.sign(speed) * more * t / 2) * t * np.exp(-less * t)  # noqa: E731
+    """A speed that grows no more than evenly, or dies away, changes no count after the end. One
+    that turns back is not what was carried on."""
+    lasting = lambda t: -np.expm1(-less * t) / less if less else t  # noqa: E731
+    path = lambda t: (speed + np.sign(speed) * more * lasting(t) / 2) * lasting(t)  # noqa: E731
     _, beyond = waited(Gliding(path), at=at, seconds=seconds)
     assert beyond == (path(seconds) > at)
 
