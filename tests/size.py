@@ -56,7 +56,7 @@ PARTS = (
     Part("tests", ("tests/*.py",), 32_000, 45_605),
     Part("benchmarks", ("benchmarks/*.py",), 1_200, 1_313),
     Part("scripts of docs", ("docs/*.py",), 1_440, 1_493),
-    Part("words of Markdown", ("*.md",), 45_000, 46_030),
+    Part("words of Markdown", ("*.md",), 45_000, 46_060),
 )
 
 
