@@ -118,7 +118,7 @@ class DominoWave(
     def build(self) -> Scene:
         row = (_plate(k, START if k == 0 else 0.0) for k in range(self.plates))
         robot = mechanism(self.name, *row, friction=0.0, self_collide=True)
-        return Scene(self.name, robot=robot)
+        return Scene(self.name, robot=robot, ground_friction=0.0)
 
     def measure(self, world: World) -> Reading:
         """The speed is 0 if the wave ends on its way."""

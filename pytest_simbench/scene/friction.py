@@ -19,7 +19,9 @@ LEAST = 1e-6
 def _of_means(pairs: FloatArray, asked: FloatArray, count: int) -> FloatArray:
     """Numbers (count,) of which each pair (n, 2) has the mean `asked` (n,), or nearly so."""
     share = np.zeros((len(pairs), count))
-    share[np.arange(len(pairs))[:, None], pairs] = 0.5
+    for row, (first, second) in zip(share, pairs, strict=True):
+        row[first] += 0.5
+        row[second] += 0.5  # of one with itself 1
     return np.asarray(np.linalg.lstsq(share, asked, rcond=None)[0])
 
 

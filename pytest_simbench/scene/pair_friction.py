@@ -36,6 +36,8 @@ def combined(scene: Scene, rule: str) -> tuple[Scene, str]:
     if rule == scene.friction_rule or len(scene.frictions) == 1:
         return scene, ""
     found = [(a, b) for a, b in combinations(range(len(own)), 2) if not (still[a] and still[b])]
+    if scene.robot is not None and scene.robot.self_collide:
+        found.append((len(own) - 1, len(own) - 1))
     pairs, frictions = np.array(found, dtype=int).reshape(-1, 2), np.array(own)
     first, second = pairs.T
     asked = RULES[scene.friction_rule](frictions[first], frictions[second])
@@ -50,8 +52,9 @@ def combined(scene: Scene, rule: str) -> tuple[Scene, str]:
         return made, ""
     worst = int(gaps.argmax())
     a, b = found[worst]
+    other = names[b] if a != b else "itself"
     return made, (
-        f"the friction of pairs is nearly that of the scene: of {names[a]} and {names[b]} it is "
+        f"the friction of pairs is nearly that of the scene: of {names[a]} and {other} it is "
         f"off by {gaps[worst]:.2g}, of no pair by more (the engine takes the {rule} of two "
         "surfaces)"
     )

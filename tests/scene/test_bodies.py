@@ -31,6 +31,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.scene.friction import RULES
 from pytest_simbench.scene.pair_friction import combined
+from pytest_simbench.testing import scenes
 
 SIGNS = list(product((-1.0, 1.0), repeat=3))
 
@@ -354,6 +355,16 @@ def test_the_bowl_s_frictions_are_exact_by_a_mean_and_not_by_the_smaller_one() -
     made, problem = combined(own, "minimum")
     assert "of cube0 and thing it is off by 0.05" in problem
     assert of_pairs(made) == pytest.approx([1.0, 1.0, 1.0])
+
+
+def test_links_that_collide_keep_their_own_friction_or_that_they_do_not_is_told() -> None:
+    robot = replace(scenes.arm(), friction=0.0, self_collide=True)
+    own = Scene("s", robot=robot, ground_friction=0.5)
+    made, problem = combined(own, "mean")
+    assert problem == ""
+    assert sorted(made.frictions) == pytest.approx([0.0, 1.0])
+    _, problem = combined(own, "minimum")
+    assert f"of {robot.name} and itself it is off by 0.5" in problem
 
 
 def test_an_unknown_rule_is_refused_with_those_there_are() -> None:
