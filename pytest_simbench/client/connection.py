@@ -26,7 +26,7 @@ from typing import Any
 import execnet
 from execnet.gateway_base import ThreadExecModel
 
-from pytest_simbench.worker.wire import frame, framed
+from pytest_simbench.worker.wire import Frames
 
 RemoteError = execnet.RemoteError
 """An exception out of the module that runs there, as text."""
@@ -96,10 +96,11 @@ class Connection:
         self._outbox: SimpleQueue[Any] = SimpleQueue()
         self._channel: Any = None
         self._cut = False
-        self.exchange: socket.socket | None = None
+        self.exchange: Frames | None = None
         self._theirs: socket.socket | None = None
         if not elsewhere(spec):
-            self.exchange, self._theirs = socket.socketpair()
+            ours, self._theirs = socket.socketpair()
+            self.exchange = Frames(ours)
         self._spec = execnet.XSpec(spec or "popen//execmodel=main_thread_only")
         if not spec:  # not in the text, where a // in a path would end it
             self._spec.python = shlex.quote(python or sys.executable)
@@ -171,9 +172,8 @@ class Connection:
         is here already: left unread, it would come before the next loop's first question."""
         if self.exchange is None:
             return self.receive(timeout)
-        self.exchange.settimeout(timeout)
         try:
-            found = framed(self.exchange)
+            found = self.exchange.receive(timeout)
         except TimeoutError:
             if self._inbox.empty():
                 raise
@@ -189,7 +189,7 @@ class Connection:
             self.send(data)
             return
         with contextlib.suppress(OSError):  # `receive` tells
-            self.exchange.sendall(frame(data or b""))
+            self.exchange.send(data or b"")
 
     @property
     def unread(self) -> bool:

@@ -26,12 +26,24 @@ def rotations(quaternions: FloatArray) -> FloatArray:
 
 
 def rotated(unit: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Vectors (n, 3) turned by unit quaternions (n, 4); half the time of `rotations`, per look."""
-    w, x, y, z = unit.T
-    a, b, c = vectors.T
-    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    turned = [a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p]
-    return np.array(turned).T
+    """Vectors (n, 3) turned by unit quaternions (n, 4); at each look, so in few calls of numpy."""
+    products = (unit[:, :, None] * unit[:, None]).reshape(-1, 16)
+    turned = (products @ _FROM_PRODUCTS).reshape(-1, 3, 3) @ vectors[:, :, None]
+    return np.asarray(turned[:, :, 0])
+
+
+def _from_products() -> FloatArray:
+    """What makes rotation matrices, (9,), of the products of two numbers of a quaternion, (16,)."""
+
+    def turn(numbers: FloatArray) -> FloatArray:
+        """Quadratic in the four numbers, and a rotation where they are a unit quaternion."""
+        return unit_rotation(numbers) + (numbers @ numbers - 1) * np.eye(3)
+
+    pairs = [[(turn(a + b) - turn(a) - turn(b)) / 2 for b in np.eye(4)] for a in np.eye(4)]
+    return np.array(pairs).reshape(16, 9)
+
+
+_FROM_PRODUCTS = _from_products()
 
 
 def overlaps(

@@ -67,7 +67,7 @@ class Loop:
         before, (position, effort) = self._target[0], answer
         way = position - before
         speed = way / self._period
-        self._queue.extend((at, speed, effort) for at in before + self._shares * way)
+        self._queue.extend([(at, speed, effort) for at in before + self._shares * way])
         self._target = position, speed, effort
         return True
 

@@ -50,8 +50,7 @@ from pytest_simbench.worker.stepping import Acting, Stepper
 from pytest_simbench.worker.watching import Watch
 from pytest_simbench.worker.wire import (
     LONGEST_LOGGED,
-    frame,
-    framed,
+    Frames,
     named,
     pack,
     readable,
@@ -89,7 +88,7 @@ class Server:
         self,
         send: Callable[[Any], None],
         receive: Callable[[], Any] = lambda: None,
-        exchange: socket.socket | None = None,
+        exchange: Frames | None = None,
     ) -> None:
         self.send, self.receive, self.exchange = send, receive, exchange
         self.simulator: Simulator | None = None
@@ -258,7 +257,7 @@ class Server:
             return self._moved(stepper.close_loop(loop, log_period))
         finally:
             if self.exchange is not None:
-                self.exchange.sendall(frame(b""))  # no question: the answer comes
+                self.exchange.send(b"")  # no question: the answer comes
 
     def _exchange(self, question: bytes) -> bytes | None:
         """The client's reply to a question.
@@ -273,8 +272,8 @@ class Server:
             self.send(question)
             reply: bytes | None = self.receive()
             return reply
-        self.exchange.sendall(frame(question))
-        return framed(self.exchange)
+        self.exchange.send(question)
+        return self.exchange.receive()
 
     def _moved(self, log: dict[str, Any]) -> dict[str, Any]:
         watch = self._loaded().watch
@@ -388,7 +387,9 @@ def serve(
     receive: Callable[[], Any], send: Callable[[Any], None], exchange: int | None = None
 ) -> None:
     """Answer requests until the client asks to close; `exchange`: descriptor of a socket to it."""
-    server = Server(send, receive, None if exchange is None else socket.socket(fileno=exchange))
+    server = Server(
+        send, receive, None if exchange is None else Frames(socket.socket(fileno=exchange))
+    )
     while True:
         request = receive()
         closing = request.get("op") == "close"

@@ -11,6 +11,9 @@ import numpy as np
 LONGEST = 2000
 """Characters of a message that are kept; the log holds more."""
 
+HEAD, CHUNK = 4, 1 << 16
+"""Bytes of a message's length, and those that are read from a socket at once."""
+
 LONGEST_LOGGED = 100_000
 """Characters of a message, or of a traceback, in the log."""
 
@@ -41,23 +44,38 @@ def unpack(value: Any) -> Any:
     return value
 
 
-def frame(data: bytes) -> bytes:
-    """Bytes as they go through a socket, their number first."""
-    return len(data).to_bytes(4, "big") + data
+class Frames:
+    """Messages through a socket, each with its length before it."""
 
+    def __init__(self, connection: socket.socket) -> None:
+        self._socket = connection
+        self._timeout: float | None = None
+        self._came = bytearray()
 
-def framed(connection: socket.socket) -> bytes | None:
-    """The next bytes that came through a socket; None: there are none.
+    def send(self, message: bytes) -> None:
+        self._socket.sendall(len(message).to_bytes(HEAD, "big") + message)
 
-    A time-out holds until the first of them has come.
-    """
-    head = connection.recv(4, socket.MSG_WAITALL)
-    length = int.from_bytes(head, "big") if len(head) == 4 else 0
-    parts = []
-    while length and (part := connection.recv(length, socket.MSG_WAITALL)):
-        parts.append(part)
-        length -= len(part)
-    return b"".join(parts) or None
+    def receive(self, timeout: float | None = None) -> bytes | None:
+        """The next message; None: an empty one, or there is no other side.
+
+        Raises:
+            TimeoutError: nothing came for `timeout` [s]; what had come is kept.
+        """
+        if timeout != self._timeout:  # a call of the kernel each time
+            self._socket.settimeout(timeout)
+            self._timeout = timeout
+        came = self._came
+        while len(came) < (end := HEAD + int.from_bytes(came[:HEAD], "big")):
+            more = self._socket.recv(CHUNK)  # most messages at once
+            if not more:
+                return None
+            came += more
+        message = bytes(came[HEAD:end])
+        del came[:end]
+        return message or None
+
+    def close(self) -> None:
+        self._socket.close()
 
 
 def readable(text: str, longest: int = LONGEST) -> str:

@@ -23,7 +23,7 @@ from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.worker.wire import frame
+from pytest_simbench.worker.wire import Frames
 from tests.tiny import Falling
 
 
@@ -69,10 +69,12 @@ def test_the_mark_that_ends_a_loop_is_read_before_the_answer_that_is_here_alread
     """Else the next loop's first question came four bytes late: numbers, but not the state's."""
     connection = Connection(None, None, {}, None)
     assert connection._theirs is not None
-    connection._theirs.sendall(frame(b""))
+    theirs = Frames(connection._theirs)
+    theirs.send(b"")
     connection._arrived("answer")
     assert connection.take(5.0) == "answer"
-    connection._theirs.sendall(frame(b"question") + frame(b""))
+    theirs.send(b"question")
+    theirs.send(b"")
     assert connection.take(5.0) == b"question"
     connection._arrived("next answer")
     assert connection.take(5.0) == "next answer"

@@ -21,7 +21,7 @@ from pytest_simbench.scene import (
     penetration,
     principal,
 )
-from pytest_simbench.scene.overlap import overlaps, rotations
+from pytest_simbench.scene.overlap import overlaps, rotated, rotations
 from pytest_simbench.scene.polytope import MOST
 
 numbers = st.floats(-1.0, 1.0)
@@ -125,6 +125,11 @@ def test_many_pairs_at_once_are_as_each_by_itself(pairs: list[tuple[Box, Box]]) 
 def test_rotations_are_those_of_poses(found: list[tuple[float, float, float, float]]) -> None:
     expected = [Pose(quaternion=q).rotation() for q in found]
     assert rotations(np.array(found)) == pytest.approx(np.array(expected))
+    unit = np.array([Pose(quaternion=q).quaternion for q in found])
+    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    vectors = np.arange(3.0 * len(found)).reshape(-1, 3)
+    turned = [turn @ vector for turn, vector in zip(expected, vectors, strict=True)]
+    assert rotated(unit, vectors) == pytest.approx(np.array(turned))
 
 
 CUBE = np.array(list(product((-0.5, 0.5), repeat=3)))
