@@ -4,6 +4,7 @@ changed, and the laws that must find it. `read_back` goes on telling the scene's
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from operator import attrgetter
 from typing import Any
 
@@ -80,6 +81,11 @@ def fat_link(s: Any) -> None:
     s.model.geom_sameframe[rows] = 0
 
 
+def viscous(s: Any) -> None:
+    """The scene is full of a thick air."""
+    s.model.opt.viscosity = 0.01
+
+
 def own_spin(s: Any) -> None:
     """Bodies start with the scene's angular velocity in their own axes."""
     for body, rows in zip(s.scene.free_bodies, s._body_v, strict=True):
@@ -113,18 +119,27 @@ WORLDS: dict[str, tuple[tuple[Tamper, ...], tuple[str, ...]]] = {
     "Bouncy": ((put("model.geom_solref", (0.02, 0.05)),), ("nothing_bounces",)),
     "SlipperyHand": ((put("model.geom_friction", 0.01, SLIDING),),
                      ("sticks_below_mu", "grip_holds")),
-    "OpenLoop": ((put("data.eq_active", 0),), ("loops_stay_closed",)),
+    "OpenLoop": ((put("data.eq_active", 0),), ("loops_stay_closed", "joints_move_together")),
     "StuckLoop": ((put("model.dof_damping", 1e3),), ("loops_stay_closed",)),
     "PassingLinks": ((put("model.geom_conaffinity", 0, lambda s: s.model.geom_contype == ROBOT),),
                      ("links_collide_when_asked",)),
-    "JoinedLinksCollide": ((put("model.exclude_signature", 0),), ("links_collide_when_asked",)),
+    "JoinedLinksCollide": ((put("model.exclude_signature", 0),),
+                           ("links_collide_when_asked", "pairs_are_kept_apart")),
     "NoEffortLimit": (NO_LIMIT, ("effort_limit_bounds_acceleration", "weak_joint_sags")),
     "WrongMass": (tuple(times(f"model.{name}", 1.5, rows) for name, rows in HEAVIER.items()),
                   ("collision_keeps_momentum",)),
     "DeepGround": ((add("model.geom_pos", -0.003, lambda s: (ground(s), 2)),
-                    put("model.geom_sameframe", 0, ground)), ("rest_on_plane",)),
-    "SoftDrives": (SOFT, ("static_hold",)),
+                    put("model.geom_sameframe", 0, ground)), ("rest_on_plane", "rounds_rest")),
+    "SoftDrives": (SOFT, ("static_hold", "motors_push")),
     "LateBrakes": ((times("model.actuator_biasprm", 0.1, (ALL, 2)),), ("saturated_drive_settles",)),
+    "HalfDamping": ((times("model.dof_damping", 0.5),), ("joints_are_damped",)),
+    "HalfDry": ((times("model.dof_frictionloss", 0.5),), ("joints_have_friction",)),
+    "HighCentre": ((add("model.body_ipos", 0.05, (-1, 2)), put("model.body_sameframe", 0, -1)),
+                   ("slides_flat",)),
+    "SlowTurn": ((times("model.body_inertia", 1.5, -1),
+                  times("model.dof_M0", 1.5, slice(-3, None))),
+                 ("ball_rolls", "can_rolls", "compounds_turn_by_their_moments")),
+    "Viscous": ((viscous,), ("brick_tumbles_on",)),
     "FreeFingers": ((put("data.eq_active", 0),), ("fingers_stay_coupled",)),
 }  # fmt: skip
 """In every scene."""
@@ -163,6 +178,12 @@ class SoftDrivesNotTold(tampered("SoftDrives")):
     """Which are declared not to be told."""
 
     info = DrivesNotTold.info
+
+
+class OtherRule(Lying):
+    """Takes the larger of two frictions, and says the smaller."""
+
+    info = replace(Lying.info, friction_rule="minimum")
 
 
 FAULTS: list[tuple[type[Lying], str]] = []

@@ -33,6 +33,7 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.FallingBelt, "moves_as_prescribed"),
     (wrong.StandingBelt, "belt_carries"),
     (tampered.SoftDrivesNotTold, "static_hold"),
+    (tampered.OtherRule, "pairs_have_their_friction"),
     (wrong.NoFeedForward, "tracks_trajectory"),
     (wrong.EchoLimits, "planted_faults_are_seen"),
     (wrong.EchoGroundFriction, "planted_faults_are_seen"),
