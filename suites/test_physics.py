@@ -8,7 +8,7 @@
 A law that a simulator breaks is a finding, with its size, and no failure: it is in the tables. A
 test fails when its repetition crashes: its world diverges, for instance. `--sim-threshold ratio=1`
 makes each law that is broken fail, `ratio=10` each that is missed by ten tolerances. A law draws
-nothing, so one repetition is enough of a simulator that is deterministic.
+nothing: a simulator that is deterministic repeats it once, whatever `--reps` says.
 
 `--sim-sweep` asks the same of other time steps: what a simulator cannot do there is a finding, too.
 """

@@ -118,9 +118,8 @@ def run(
             place.take_over(found.values())
             place.describe(experiment.task)
             repeater = Repeater(experiment, executor, printed(quiet), place.append, resumed=resumed)
-            own = experiment.task.repetitions or experiment.case.protocol.repetitions
             try:
-                repeater.up_to(wanted or own, found)
+                repeater.up_to(experiment.repetitions(wanted), found)
             except (Unavailable, WorldParityError) as error:
                 problems.append(f"{experiment.case.simulator}: {error.what}")
             except (KeyboardInterrupt, Exception) as error:  # Ctrl-C, or a fault of the task

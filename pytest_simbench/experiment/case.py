@@ -16,6 +16,7 @@ from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.series import short
 from pytest_simbench.records.tuned_on import FIRST_SEED, Seen
 from pytest_simbench.scene import Robot
+from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.profile_file import ENDING, ProfileFile, read_profile
 from pytest_simbench.simulator.registry import adapter, address, seeds_seen
 from pytest_simbench.tasks.base import Task
@@ -81,6 +82,7 @@ class Case:
         video: which repetitions are filmed: one more, of the first seed (`first`; see
             `photographer`), all (`on`), all but only failed ones are kept (`retain-on-failure`),
             none (`off`).
+        deterministic: the simulator claims that it repeats itself.
         costly_start: the engine compiles when it starts; one worker serves several repetitions.
         compile_timeout: of the compiling [s].
         fresh: start a new worker for each repetition all the same.
@@ -113,6 +115,7 @@ class Case:
     jitter: float = 1.0
     trace: str = "off"
     video: str = "off"
+    deterministic: bool = False
     costly_start: bool = False
     compile_timeout: float = 0.0
     fresh: bool = False
@@ -158,6 +161,7 @@ class Case:
             adapter=address(simulator) or "",
             python=python or interpreter(info),
             environment=Environment.of(info).variables(),
+            deterministic=Capability.DETERMINISTIC in info.capabilities,
             costly_start=info.costly_start,
             compile_timeout=info.compile_timeout,
             **more,

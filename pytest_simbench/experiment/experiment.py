@@ -56,6 +56,17 @@ class Experiment:
         """Of a repetition, counted from 1."""
         return self.case.seed + number - 1
 
+    @property
+    def all_alike(self) -> bool:
+        """Whether one repetition is all there is: the others would be the same."""
+        return self.case.deterministic and not self.task.draws
+
+    def repetitions(self, asked: int | None) -> int:
+        """How many there are to be: what is asked for, else what the task or the protocol has."""
+        if self.all_alike:
+            return 1
+        return asked or self.task.repetitions or self.case.protocol.repetitions
+
     def scene(self, seed: int) -> Scene:
         """The world that the task begins with, its cubes disturbed as `--jitter` has it."""
         one, scale = Jitter(), self.case.jitter

@@ -60,8 +60,7 @@ class Law(Task):
     `fall_speed`, unless the class has a `name`. A class whose name is "" or begins with `_` is no
     law: others share what it has.
 
-    A law draws nothing: seed and jitter do not matter, and one repetition is enough of an engine
-    that is deterministic.
+    A law draws nothing: seed and jitter do not matter.
 
     Attributes:
         phenomenon: one of `records.phenomena.PHENOMENA`.
@@ -73,6 +72,7 @@ class Law(Task):
 
     study_timeout: ClassVar[float] = 300.0
     references: ClassVar[Mapping[str, float]] = {"error": 0.0, "ratio": 0.0}
+    draws: ClassVar[bool] = False
     shares_worker: ClassVar[bool] = True
 
     phenomenon: ClassVar[str]

@@ -78,13 +78,14 @@ class RepeatFixture:
                 return repeater.up_to(number, found)
 
         metrics = experiment.task.metrics
-        if isinstance(wanted, Auto):
+        if isinstance(wanted, Auto) and not experiment.all_alike:
             plan = Plan.up_to(wanted.limit)
             first = up_to(plan.looks[0])
             result: ResultSet = SequentialResultSet(first, metrics, plan, up_to)
         else:
-            number = wanted or number_mark(self.node, "reps") or experiment.task.repetitions
-            result = ResultSet(up_to(int(number or self.case.protocol.repetitions)), metrics)
+            asked = None if isinstance(wanted, Auto) else wanted
+            number = experiment.repetitions(asked or number_mark(self.node, "reps"))
+            result = ResultSet(up_to(number), metrics)
         recording.photograph(self.node.config, experiment, result.records, self.run.tell)
         result.strict = options.value(self.node.config, "sim_strict")
         result.warns = False

@@ -10,6 +10,7 @@ from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Hooks, Repetition, group
 from pytest_simbench.ground.errors import SimulatorError
+from pytest_simbench.laws.free import FreeFall
 from pytest_simbench.tasks.base import Task
 from tests.tiny import Falling
 
@@ -37,6 +38,23 @@ def test_seeds_count_on_from_the_case_s(case: Case) -> None:
     assert experiment.seed() == 40
 
 
+@pytest.mark.parametrize(
+    ("deterministic", "task", "asked", "done"),
+    [
+        (True, FreeFall(), 20, 1),
+        (True, FreeFall(), None, 1),
+        (False, FreeFall(), 3, 3),
+        (True, Falling(), 3, 3),
+        (True, Falling(), None, 20),
+    ],
+)
+def test_what_draws_nothing_is_done_once_where_it_would_be_the_same(
+    case: Case, deterministic: bool, task: Task, asked: int | None, done: int
+) -> None:
+    experiment = Experiment(replace(case, deterministic=deterministic), task)
+    assert experiment.repetitions(asked) == done
+
+
 def test_the_task_has_its_own_time_out_unless_the_case_gives_one(case: Case) -> None:
     assert Experiment(case, Falling()).timeout == Falling.study_timeout
     experiment = Experiment(replace(case, timeout=5.0, memory_limit=900.0), Falling())
@@ -47,7 +65,8 @@ def test_the_task_has_its_own_time_out_unless_the_case_gives_one(case: Case) -> 
 def test_a_case_of_a_registered_simulator(case: Case) -> None:
     told = {"test": case.test, "mode": "headless", "profile": "tuned", "folder": case.folder}
     found = Case.of("mujoco", stall_timeout=case.stall_timeout, **told)
-    assert replace(found, compile_timeout=0.0) == case
+    assert found.deterministic
+    assert replace(found, compile_timeout=0.0, deterministic=False) == case
     assert Case.of("mujoco", python="/a/python", **told).python == "/a/python"
     with pytest.raises(SimulatorError, match="mujoco"):
         Case.of("mojuco", **told)

@@ -193,6 +193,7 @@ def test_what_a_file_says_of_starting_is_not_looked_at(
         profile="tuned",
         adapter="pytest_simbench.sims.mujoco.adapter:MuJoCo",
         folder=tmp_path / "logs",
+        deterministic=True,
         compile_timeout=900.0,
     )
     assert main([str(path)]) == 0

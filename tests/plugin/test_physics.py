@@ -15,9 +15,9 @@ SUITE = Path(__file__).resolve().parents[2] / "suites" / "test_physics.py"
 def test_a_broken_law_is_a_finding_and_no_failure_unless_asked_for(
     pytester: pytest.Pytester,
 ) -> None:
-    """PyBullet's motors are no springs: a rod on one does not sag."""
+    """PyBullet's motors are no springs: a rod on one does not sag. Each law is asked once."""
     pytester.makepyfile(test_physics=SUITE.read_text("utf-8"))
-    asked = ("--sim=mujoco,pybullet", "-k", "free_fall or sag", "--sim-output=out")
+    asked = ("--sim=mujoco,pybullet", "-k", "free_fall or sag", "--sim-output=out", "--reps=3")
     result = pytester.runpytest_subprocess(*asked, "--sim-threshold=ratio=2")
     result.assert_outcomes(passed=3, failed=1)
     result.stdout.fnmatch_lines(
