@@ -1,7 +1,8 @@
 """What DART says that it built, for the parity check.
 
 DART tells no corners of a mesh, so each mesh is measured: by its distance from a large box, found
-with a collision detector (FCL, exact) that the world does not use.
+with a collision detector (FCL, exact) that the world does not use. A Mico2 arm takes 4 s, so a
+process measures a mesh of one file, scale, bounding box and place in its body once.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pytest_simbench.simulator import lazy_import
 
 dartpy = lazy_import("dartpy")
 
+_MEASURED: dict[tuple[str, bytes], FloatArray] = {}
 _PROBE, _AWAY = 2.0, 3.0
 """Edge of the box that measures, and how far from a mesh's origin its face stands [m]."""
 
@@ -126,7 +128,18 @@ class ReadBack(readback.ReadBack):
         return all(self.robot.getJoint(p.follower).getActuatorType() == mimic for p in pairs)
 
     def _measured(self, shape: Any, place: Any) -> FloatArray:
-        """The reach of a mesh in the frame at `place`."""
+        """The reach of a mesh in the frame of its body, which is at `place`; see the module."""
+        solid = shape.getShape()
+        if not isinstance(solid, dartpy.dynamics.MeshShape):
+            return self._measure(shape, place)
+        box, within = solid.getBoundingBox(), shape.getRelativeTransform().matrix()
+        numbers = np.concatenate([solid.getScale(), box.getMin(), box.getMax(), within.ravel()])
+        mesh = solid.getMeshPath(), numbers.tobytes()
+        if mesh not in _MEASURED:
+            _MEASURED[mesh] = self._measure(shape, place)
+        return _MEASURED[mesh]
+
+    def _measure(self, shape: Any, place: Any) -> FloatArray:
         group = self.detector.createCollisionGroup()
         group.addShapeFrame(shape)
         group.addShapeFrame(self.probe)
