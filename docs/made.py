@@ -26,6 +26,7 @@ import make_contact
 import make_options
 import make_results
 import make_tasks
+import make_transfer
 import make_truth
 from published_runs import PUBLISHED
 from tables import DATA, DOCS, table
@@ -57,6 +58,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "planted": planted,
     "claims": make_claims.claims,
     "contact": make_contact.contact,
+    "ceilings": make_transfer.ceilings,
     "options": make_options.options,
     "commands": make_options.commands,
     "marks": make_options.marks,
@@ -124,6 +126,7 @@ def read(folders: Sequence[str], **published: str) -> None:
         if make_claims.read(run):
             continue
         records = run.records
+        make_transfer.read(records)
         laws = make_truth.SWEEP if any(r.swept for r in records) else make_truth.TRUTH
         for kept in (laws, make_contact.CONTACT, *make_tasks.KEPT):
             kept.read(records)

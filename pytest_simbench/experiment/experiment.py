@@ -57,13 +57,13 @@ class Experiment:
         return self.case.seed + number - 1
 
     @property
-    def all_alike(self) -> bool:
-        """Whether one repetition is all there is: the others would be the same."""
+    def sole(self) -> bool:
+        """Whether one repetition is all there is: others would be the same."""
         return self.case.deterministic and not self.task.draws
 
     def repetitions(self, asked: int | None) -> int:
         """How many there are to be: what is asked for, else what the task or the protocol has."""
-        if self.all_alike:
+        if self.sole:
             return 1
         return asked or self.task.repetitions or self.case.protocol.repetitions
 

@@ -288,6 +288,7 @@ class Repetition:
             sample=self.experiment.task.sample(self.seed),
             reading=outcome.reading,
             wait=outcome.wait,
+            sole=self.experiment.sole,
         )
         return record_of(
             self.experiment,

@@ -50,6 +50,7 @@ class MeanDifference:
         p_value: probability of such a difference (in the direction asked for) without a true one.
         paired: whether values of the same seed were paired.
         n: repetitions on each side, or pairs.
+        sole: whether more of them would be the same, so that nothing is left to chance.
     """
 
     first: float
@@ -57,6 +58,7 @@ class MeanDifference:
     p_value: float
     paired: bool
     n: tuple[int, int]
+    sole: bool = False
 
     @property
     def difference(self) -> float:

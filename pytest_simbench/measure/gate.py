@@ -81,11 +81,14 @@ class Change:
         before, after = self.comparison.first, self.comparison.second
         verb = "fell" if after < before else "rose" if after > before else "stayed"
         speed = ", machine speed taken out" if self.normalised else ""
+        sure = f"p = {self.p_value:.2g}, {self.repetitions}{speed}"
+        if self.comparison.sole:
+            sure = "every repetition is the same"
         return (
             f"{self.test}: {self.metric.name} {verb} from {self.metric.format(before)} to "
             f"{self.metric.format(after)} (worse by {self.limit.describe(self.metric, self.loss)}, "
             f"limit {self.limit.describe(self.metric, self.limit.amount)}; "
-            f"p = {self.p_value:.2g}, {self.repetitions}{speed})"
+            f"{sure})"
         )
 
 
@@ -313,7 +316,13 @@ def _change(
     if not first or not second:
         return f"no repetition of {'this run' if first else 'the baseline'} has a value"
     worse: Alternative = "less" if metric.better == "higher" else "greater"
-    comparison = compare_by_seed(first, second, "two-sided" if both_ways else worse)
+    alternative: Alternative = "two-sided" if both_ways else worse
+    comparison = compare_by_seed(first, second, alternative)
+    if old.sole and new.sole and metric.name in new.metrics:
+        changed = abs(comparison.difference) > metric.smallest_difference
+        sign = {"less": -1, "greater": 1}.get(alternative)
+        seen = changed and (sign is None or sign * comparison.difference > 0)
+        comparison = replace(comparison, p_value=float(not seen), sole=True)
     loss = limit.loss(metric, comparison.first, comparison.second)
     p_value = comparison.p_value
     return Change(test, metric, limit, comparison, p_value, loss, evened is not None)
@@ -331,6 +340,8 @@ def _of_machines(old: ResultSet, new: ResultSet, name: str) -> bool:
 
 def _smallest_p(comparison: MeanDifference) -> float:
     """The smallest p value that so many repetitions can give in a permutation test."""
+    if comparison.sole:
+        return 0.0
     first, second = comparison.n
     arrangements = 2**first if comparison.paired else math.comb(first + second, first)
     return 1 / min(arrangements, PERMUTATIONS + 1)

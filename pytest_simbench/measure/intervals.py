@@ -15,7 +15,8 @@ Which one is used where:
   holds for every distribution and never lies below the least value, where t's does for rare counts;
 - values that are all alike (within the metric's resolution): none. They are a deterministic
   simulator's, whose seeds do not matter, and so say nothing of a spread;
-- fewer than `FEWEST` values: none, since nothing holds there.
+- fewer than `FEWEST` values: none, since nothing holds there; but one that would be repeated to the
+  bit (`Notes.sole`) is constant.
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from math import isfinite
 from typing import NoReturn
 
@@ -87,6 +88,11 @@ class ResultSet:
         return self._ok[1]
 
     @property
+    def sole(self) -> bool:
+        """Whether all repetitions there could be would be the same as these."""
+        return all(record.notes.sole for record in self.records)
+
+    @property
     def crashed(self) -> tuple[Record, ...]:
         """The repetitions that crashed; each has its `error`."""
         return tuple(record for record in self.records if record.status == "failed")
@@ -142,7 +148,10 @@ class ResultSet:
         """The interval of a metric's mean; without values its mean is nan and n is 0."""
         key = (name, confidence)
         if key not in self._intervals:
-            self._intervals[key] = interval(self.values(name), self.metric(name), confidence)
+            found = interval(self.values(name), self.metric(name), confidence)
+            if self.sole and found.method == "none" and found.n and name in self.metrics:
+                found = replace(found, method="constant")
+            self._intervals[key] = found
         return self._intervals[key]
 
     def crash_interval(self, confidence: float = CONFIDENCE) -> Interval:

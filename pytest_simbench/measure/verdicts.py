@@ -101,7 +101,7 @@ def judge(claim: Bound, interval: Interval) -> Judgement:
 
     A value that was the same in all repetitions is judged as it is.
     """
-    if interval.n < FEWEST:
+    if interval.n < FEWEST and interval.method != "constant":
         return Judgement(Verdict.NOT_JUDGED, claim, interval, None)
     low, high, value = interval.low, interval.high, claim.value
     if interval.method == "constant":

@@ -127,5 +127,5 @@ def _of(item: pytest.Item) -> Iterator[Experiment]:
     with suppress(SimulatorError):  # its test tells
         found = Experiment(case_of(item.config, variant, item, {}), task)
         asked = options.value(item.config, "sim_reps") or number_mark(item, "reps")
-        if found.all_alike or asked == 1:
+        if found.sole or asked == 1:
             yield found

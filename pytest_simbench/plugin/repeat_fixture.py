@@ -78,7 +78,7 @@ class RepeatFixture:
                 return repeater.up_to(number, found)
 
         metrics = experiment.task.metrics
-        if isinstance(wanted, Auto) and not experiment.all_alike:
+        if isinstance(wanted, Auto) and not experiment.sole:
             plan = Plan.up_to(wanted.limit)
             first = up_to(plan.looks[0])
             result: ResultSet = SequentialResultSet(first, metrics, plan, up_to)

@@ -44,6 +44,8 @@ class Notes:
         sample: the measured motion that it was held against.
         reading: of a law: measured, right, and the tolerance.
         wait: for the count.
+        sole: whether others would be the same: the task draws nothing, and the simulator claims to
+            be deterministic.
         lost_nodes: machines of a cluster that were lost with it before, and how.
     """
 
@@ -60,4 +62,5 @@ class Notes:
     sample: Sample | None = None
     reading: Reading | None = None
     wait: Wait | None = None
+    sole: bool = False
     lost_nodes: tuple[str, ...] = ()

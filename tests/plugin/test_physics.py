@@ -42,6 +42,27 @@ def test_a_broken_law_is_a_finding_and_no_failure_unless_asked_for(
     again.stdout.fnmatch_lines(["for joints: mujoco, which keeps 1 of 1 laws."])
 
 
+def test_a_law_that_is_asked_once_can_be_claimed_and_gated(pytester: pytest.Pytester) -> None:
+    """Others would be the same: nothing is left to chance."""
+    pytester.makepyfile(
+        """
+        from pytest_simbench.laws import LAWS
+
+        def test_it(repeat):
+            repeat(LAWS[0]).assert_at_most("ratio", 0.5)
+        """
+    )
+    asked = ("--sim=mujoco", "--reps=20", "--sim-strict")
+    pytester.runpytest_subprocess(*asked, "--sim-output=first").assert_outcomes(passed=1)
+    slower = (*asked, "--sim-set=mujoco.timestep=0.004", "--sim-baseline=first")
+    same = pytester.runpytest_subprocess(*slower, "--sim-compare-fail=ratio:100000%")
+    same.assert_outcomes(passed=1)
+    assert same.ret == 0
+    worse = pytester.runpytest_subprocess(*slower, "--sim-compare-fail=error:50%")
+    assert worse.ret == 1
+    worse.stdout.fnmatch_lines(["*: error rose from *", "*every repetition is the same)"])
+
+
 def ids(folder: Path) -> list[str]:
     return [record["test"].partition("::")[2] for record in records(folder)]
 
