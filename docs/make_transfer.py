@@ -13,7 +13,9 @@ from pytest_simbench.measure.transfer import METRIC, POLICY, Ceiling
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.model.transfer import interval
 
-FILE, FIRST, TASK = DATA / "transfer.csv", 2000, "pushing_to_goal"
+FILE, TASK = DATA / "transfer.csv", "pushing_to_goal"
+FIRST, LAST = 2000, 10_000
+"""Seeds; those of a run that names none begin after them."""
 
 
 def signs() -> dict[tuple[str, str], str]:
@@ -26,7 +28,8 @@ def read(records: Iterable[Record]) -> None:
     """Put runs of suites/policies/ladder.py into the file; seeds follow those that are there."""
     found = {key: dict(enumerate(kept, FIRST)) for key, kept in signs().items()}
     for r in records:
-        if r.task == TASK and r.status != "interrupted" and r.profile == "tuned":
+        late = r.task != TASK or r.settings["task.command_latency"]
+        if not late and r.profile == "tuned" and r.seed <= LAST and r.status != "interrupted":
             sign = "x" if r.status == "failed" else f"{r.metrics[METRIC]:.0f}"
             found.setdefault((r.simulator, str(r.settings[POLICY])), {})[r.seed] = sign
     with FILE.open("w", encoding="utf-8", newline="") as file:
@@ -48,5 +51,5 @@ def ceilings() -> str:
             shares = sorted(100 * line.mean() for line in of)
             spread = f"{shares[1]:.0f} to {shares[-1]:.0f}"
             told = interval(ceiling.tau)
-            rows.append((name, str(len(of[0])), spread, told, f"{ceiling.needed}"))
+            rows.append((name, str(len(of[0])), spread, told, f"{ceiling.needed or 'any'}"))
     return table(("simulator", "seeds", "success %", "ceiling of tau-b", "seeds it takes"), rows)

@@ -63,9 +63,8 @@ class Experiment:
 
     def repetitions(self, asked: int | None) -> int:
         """How many there are to be: what is asked for, else what the task or the protocol has."""
-        if self.sole:
-            return 1
-        return asked or self.task.repetitions or self.case.protocol.repetitions
+        number = asked or self.task.repetitions or self.case.protocol.repetitions
+        return 1 if self.sole else number
 
     def scene(self, seed: int) -> Scene:
         """The world that the task begins with, its cubes disturbed as `--jitter` has it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pytest_simbench.measure.comparison import MeanDifference, compare_by_seed
+from pytest_simbench.measure.comparison import Alternative, MeanDifference, compare_by_seed
 from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import without_speed
@@ -42,7 +42,9 @@ def difference(metric: Metric, before: ResultSet, after: ResultSet) -> MeanDiffe
     else:
         usual = before.by_seed(metric.name), after.by_seed(metric.name)
         sides = without_speed(metric.name, before, after) or usual
-    return compare_by_seed(*sides, "less" if metric.better == "higher" else "greater")
+    worse: Alternative = "less" if metric.better == "higher" else "greater"
+    sole = before.sole(metric.name) and after.sole(metric.name)
+    return compare_by_seed(*sides, worse, sole=sole)
 
 
 def like_the_bad_one(metric: Metric, good: ResultSet, bad: ResultSet, other: ResultSet) -> bool:

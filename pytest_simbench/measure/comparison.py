@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -78,9 +78,16 @@ def pair(first: Mapping[int, float], second: Mapping[int, float]) -> tuple[Float
 
 
 def compare_by_seed(
-    first: Mapping[int, float], second: Mapping[int, float], alternative: Alternative = "two-sided"
+    first: Mapping[int, float],
+    second: Mapping[int, float],
+    alternative: Alternative = "two-sided",
+    *,
+    sole: bool = False,
 ) -> MeanDifference:
     """Test whether `second` differs from `first`, paired where nearly all seeds are on both sides.
+
+    Args:
+        sole: more repetitions would be the same: the means differ, or they do not.
 
     Raises:
         ValueError: an empty side.
@@ -88,7 +95,12 @@ def compare_by_seed(
     shared = len(first.keys() & second.keys())
     paired = shared >= max(2, math.ceil(COMMON_SEEDS * min(len(first), len(second))))
     sides = pair(first, second) if paired else ([*first.values()], [*second.values()])
-    return compare(*sides, paired=paired, alternative=alternative)
+    found = compare(*sides, paired=paired, alternative=alternative)
+    if not sole:
+        return found
+    apart = not math.isclose(found.first, found.second, rel_tol=1e-12)
+    wrong_way = {"two-sided": False, "less": found.difference > 0, "greater": found.difference < 0}
+    return replace(found, p_value=float(not apart or wrong_way[alternative]), sole=True)
 
 
 def compare(

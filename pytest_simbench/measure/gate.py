@@ -87,8 +87,7 @@ class Change:
         return (
             f"{self.test}: {self.metric.name} {verb} from {self.metric.format(before)} to "
             f"{self.metric.format(after)} (worse by {self.limit.describe(self.metric, self.loss)}, "
-            f"limit {self.limit.describe(self.metric, self.limit.amount)}; "
-            f"{sure})"
+            f"limit {self.limit.describe(self.metric, self.limit.amount)}; {sure})"
         )
 
 
@@ -316,13 +315,8 @@ def _change(
     if not first or not second:
         return f"no repetition of {'this run' if first else 'the baseline'} has a value"
     worse: Alternative = "less" if metric.better == "higher" else "greater"
-    alternative: Alternative = "two-sided" if both_ways else worse
-    comparison = compare_by_seed(first, second, alternative)
-    if old.sole and new.sole and metric.name in new.metrics:
-        changed = abs(comparison.difference) > metric.smallest_difference
-        sign = {"less": -1, "greater": 1}.get(alternative)
-        seen = changed and (sign is None or sign * comparison.difference > 0)
-        comparison = replace(comparison, p_value=float(not seen), sole=True)
+    sole = old.sole(metric.name) and new.sole(metric.name)
+    comparison = compare_by_seed(first, second, "two-sided" if both_ways else worse, sole=sole)
     loss = limit.loss(metric, comparison.first, comparison.second)
     p_value = comparison.p_value
     return Change(test, metric, limit, comparison, p_value, loss, evened is not None)

@@ -87,10 +87,9 @@ class ResultSet:
             self._ok = self.records, tuple(record for record in self.records if record.ok)
         return self._ok[1]
 
-    @property
-    def sole(self) -> bool:
-        """Whether all repetitions there could be would be the same as these."""
-        return all(record.notes.sole for record in self.records)
+    def sole(self, name: str) -> bool:
+        """Whether a metric has one value, which every repetition there could be would have."""
+        return name in self.metrics and all(record.notes.sole for record in self.records)
 
     @property
     def crashed(self) -> tuple[Record, ...]:
@@ -149,7 +148,7 @@ class ResultSet:
         key = (name, confidence)
         if key not in self._intervals:
             found = interval(self.values(name), self.metric(name), confidence)
-            if self.sole and found.method == "none" and found.n and name in self.metrics:
+            if found.method == "none" and found.n and self.sole(name):
                 found = replace(found, method="constant")
             self._intervals[key] = found
         return self._intervals[key]

@@ -83,9 +83,8 @@ class RepeatFixture:
             first = up_to(plan.looks[0])
             result: ResultSet = SequentialResultSet(first, metrics, plan, up_to)
         else:
-            asked = None if isinstance(wanted, Auto) else wanted
-            number = experiment.repetitions(asked or number_mark(self.node, "reps"))
-            result = ResultSet(up_to(number), metrics)
+            asked = wanted or number_mark(self.node, "reps")
+            result = ResultSet(up_to(experiment.repetitions(asked)), metrics)
         recording.photograph(self.node.config, experiment, result.records, self.run.tell)
         result.strict = options.value(self.node.config, "sim_strict")
         result.warns = False

@@ -35,8 +35,7 @@ def rotated(unit: FloatArray, vectors: FloatArray) -> FloatArray:
 def _from_products() -> FloatArray:
     """What makes rotation matrices, (9,), of the products of two numbers of a quaternion, (16,)."""
 
-    def turn(numbers: FloatArray) -> FloatArray:
-        """Quadratic in the four numbers, and a rotation where they are a unit quaternion."""
+    def turn(numbers: FloatArray) -> FloatArray:  # quadratic in them; of unit ones a rotation
         return unit_rotation(numbers) + (numbers @ numbers - 1) * np.eye(3)
 
     pairs = [[(turn(a + b) - turn(a) - turn(b)) / 2 for b in np.eye(4)] for a in np.eye(4)]

@@ -11,11 +11,11 @@ import numpy as np
 LONGEST = 2000
 """Characters of a message that are kept; the log holds more."""
 
-HEAD, CHUNK = 4, 1 << 16
-"""Bytes of a message's length, and those that are read from a socket at once."""
-
 LONGEST_LOGGED = 100_000
 """Characters of a message, or of a traceback, in the log."""
+
+HEAD, CHUNK = 4, 1 << 16
+"""Bytes of a message's length, and those that are read from a socket at once."""
 
 
 def pack(value: Any) -> Any:

@@ -97,6 +97,13 @@ def test_sides_without_spread_can_still_differ(paired: bool) -> None:
     assert found.difference == pytest.approx(0.4)
 
 
+def test_one_value_that_all_repetitions_would_have_leaves_nothing_to_chance() -> None:
+    known = {2.0: [0, 0, 1], 0.5: [0, 1, 0], 1.0: [1, 1, 1], 1 + 1e-15: [1, 1, 1]}
+    for second, expected in known.items():
+        for way, p in zip(("two-sided", "greater", "less"), expected, strict=True):
+            assert compare_by_seed({1: 1.0}, {1: second}, way, sole=True).p_value == p
+
+
 def test_the_direction_is_that_of_second_minus_first() -> None:
     low, high = [1.0, 1.1, 1.2, 1.3, 1.4], [2.0, 2.1, 2.2, 2.3, 2.4]
     assert compare(low, high, alternative="greater").p_value == pytest.approx(1 / 252)

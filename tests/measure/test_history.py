@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from pytest_simbench.measure import bisection
 from pytest_simbench.measure.bisection import between, first_worse, like_the_bad_one, steps
 from pytest_simbench.measure.gate import run_gate, side_by_side
 from pytest_simbench.measure.history import histories
@@ -141,3 +142,9 @@ def test_a_simulators_name_in_a_folder_or_a_parameter_hides_no_comparison() -> N
     alone = [r for r in found if r.simulator == "mujoco"]
     nothing = run_gate(*side_by_side(alone, "mujoco", ["mujoco==3.3.7"]), (), {})
     assert "no test of this run is in the baseline" in nothing.failures[0]
+
+
+def test_a_release_is_worse_by_one_value_that_all_repetitions_would_have() -> None:
+    kept = [record(1, metrics={"placed": placed}).noting(sole=True) for placed in (1.0, 0.9)]
+    sides = (ResultSet([each], METRICS) for each in kept)
+    assert bisection.difference(PLACED, *sides).p_value == 0.0

@@ -43,7 +43,6 @@ def test_a_broken_law_is_a_finding_and_no_failure_unless_asked_for(
 
 
 def test_a_law_that_is_asked_once_can_be_claimed_and_gated(pytester: pytest.Pytester) -> None:
-    """Others would be the same: nothing is left to chance."""
     pytester.makepyfile(
         """
         from pytest_simbench.laws import LAWS

@@ -13,17 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from pytest_simbench.worker.wire import (
-    CHUNK,
-    LONGEST,
-    LONGEST_LOGGED,
-    Frames,
-    named,
-    pack,
-    readable,
-    told,
-    unpack,
-)
+from pytest_simbench.worker import wire
+from pytest_simbench.worker.wire import LONGEST, LONGEST_LOGGED, named, pack, readable, told, unpack
 
 arrays = npst.arrays(
     st.sampled_from([np.float64, np.int64, np.uint8, np.bool_]),
@@ -56,17 +47,17 @@ def test_what_the_wire_carries() -> None:
 
 
 @pytest.fixture
-def two_ends() -> Iterator[tuple[socket.socket, Frames]]:
+def two_ends() -> Iterator[tuple[socket.socket, wire.Frames]]:
     """Of a socket: one that sends bytes, one that reads messages."""
     sender, receiver = socket.socketpair()
     with sender, receiver:
-        yield sender, Frames(receiver)
+        yield sender, wire.Frames(receiver)
 
 
-def test_messages_come_whole_and_in_their_order(two_ends: tuple[socket.socket, Frames]) -> None:
+def test_messages_come_whole_and_in_order(two_ends: tuple[socket.socket, wire.Frames]) -> None:
     sender, reader = two_ends
-    sent = [b"a", bytes(range(256)) * (CHUNK // 256 + 1), b"\0\0\0\1", b"x" * CHUNK]
-    thread = threading.Thread(target=lambda: [Frames(sender).send(message) for message in sent])
+    sent = [b"a", bytes(range(256)) * (wire.CHUNK // 256 + 1), b"\0\0\0\1", b"x" * wire.CHUNK]
+    thread = threading.Thread(target=lambda: [*map(wire.Frames(sender).send, sent)])
     thread.start()
     assert [reader.receive(5.0) for _ in sent] == sent
     thread.join()
@@ -78,7 +69,7 @@ def test_however_the_bytes_are_cut(messages: list[bytes], data: st.DataObject) -
     with sender, receiver:
         raw = b"".join(len(message).to_bytes(4, "big") + message for message in messages)
         cuts = sorted(data.draw(st.lists(st.integers(0, len(raw)), max_size=5)))
-        reader, found = Frames(receiver), []
+        reader, found = wire.Frames(receiver), []
         for begin, end in pairwise([0, *cuts, len(raw)]):
             sender.sendall(raw[begin:end])
             try:
@@ -89,14 +80,11 @@ def test_however_the_bytes_are_cut(messages: list[bytes], data: st.DataObject) -
     assert found == [message or None for message in messages]
 
 
-def test_no_message_in_time_and_no_other_side(two_ends: tuple[socket.socket, Frames]) -> None:
+def test_no_message_in_time_and_no_other_side(two_ends: tuple[socket.socket, wire.Frames]) -> None:
     sender, reader = two_ends
     sender.sendall(b"\0\0\0\2a")
     with pytest.raises(TimeoutError):
         reader.receive(0.01)
-    sender.sendall(b"b")
-    assert reader.receive(0.01) == b"ab"
-    sender.sendall(b"\0\0\0\2a")
     sender.close()
     assert reader.receive() is None
 
