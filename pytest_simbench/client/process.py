@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import shutil
+import signal
 import threading
 import time
 from collections.abc import Callable, Generator, Mapping
@@ -339,17 +340,15 @@ class WorkerProcess:
         """The error for a connection that ended, or never began."""
         there = isinstance(problem, RemoteError)  # out of the bootstrap: the process lives on
         code = None if self._ended or there else self._connection.status(EXIT_TIMEOUT)
-        if code is not None and (code < 0 or self.pid is not None):
-            return self._ended_by(WorkerExited, f"the worker {exit_text(code)}")
-        if self.pid is None:
-            if code is not None:
-                reason = f"it {exit_text(code)}"
-            elif there:
+        if code == -signal.SIGINT and self.pid is None:  # Ctrl-C met it before its own session
+            return self._ended_by(Interrupted, "the run was interrupted")
+        if self.pid is None and (code is None or code >= 0):
+            if there:
                 reason = readable(str(problem).strip().rpartition("\n")[2])
             else:
-                reason = named(problem) if problem else exit_text(None)
+                reason = named(problem) if problem and code is None else f"it {exit_text(code)}"
             return self._ended_by(WorkerStartError, self._start_text(reason))
-        if problem is not None:
+        if problem is not None and code is None:
             return self._ended_by(ProtocolError, f"the connection failed: {named(problem)}")
         return self._ended_by(WorkerExited, f"the worker {exit_text(code)}")
 

@@ -52,6 +52,7 @@ class GoalTask(Task):
     """
 
     study_timeout: ClassVar[float] = 600.0
+    shares_worker: ClassVar[bool] = True
     counted: ClassVar[str] = "goals reached"
     references: ClassVar[Mapping[str, float]] = {"success": 1.0, "distance": 0.0}
     moved: ClassVar[str | None] = None

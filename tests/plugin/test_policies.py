@@ -58,6 +58,7 @@ def test_a_test_is_made_for_each_policy_of_its_task(pytester: pytest.Pytester) -
     assert [r["variant"] for r in found[::2]] == ["still", "nothing", "one"]
     assert [r["settings"]["task.policy"] for r in found[::2]] == ["still", "nothing", "one"]
     assert len({r["settings"]["task.policy_digest"] for r in found}) == 3
+    assert all(r["reused_worker"] for r in found[2:])
 
 
 def test_without_policies_the_shipped_ones_wait_for_their_file(pytester: pytest.Pytester) -> None:
