@@ -28,7 +28,7 @@ from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks.base import Task
 
@@ -74,7 +74,7 @@ class RepeatFixture:
         )
 
         def up_to(number: int) -> list[Record]:
-            with failing((*REFUSALS, LoopError)):
+            with failing((*REFUSALS, LoopError, RecordError)):
                 return repeater.up_to(number, found)
 
         metrics = experiment.task.metrics
