@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from math import isfinite
 from typing import Any
 
@@ -107,11 +109,13 @@ class RepeatFixture:
 
     def finish(self, benchmark: Any) -> None:
         """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
+        alike = Counter[tuple[object, ...]]()
         for result in self.results:
             self.node.user_properties.extend(_properties(result))
             for metric, judgement in result.judged:
                 claim = claim_of(self.case, result, metric, judgement)
-                self.run.folder.claim(claim)
+                self.run.folder.claim(replace(claim, number=alike[claim.identity]))
+                alike[claim.identity] += 1
                 title = in_one_line(f"claim {metric.name} {judgement.claim}")
                 self.node.user_properties.append((title, claim.verdict))
         if self.results and benchmark is not None:

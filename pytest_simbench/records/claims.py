@@ -22,6 +22,7 @@ class Claim(FolderLine):
             empty where the test as a whole failed.
         metric, relation, threshold: what was claimed of which metric; empty where the test as a
             whole failed.
+        number: of claims of one test that are alike in task, metric and relation, from 0.
         verdict: what the repetitions say of it.
         mean, low, high: what was measured, and the bounds that decided; None where there are none.
         n, crashed: repetitions that were judged, and those of them that crashed.
@@ -45,8 +46,9 @@ class Claim(FolderLine):
     n: Count = 0
     crashed: Count = 0
     advice: str = ""
+    number: Count = 0
 
     @property
     def identity(self) -> tuple[object, ...]:
         """What tells it from other claims of a run."""
-        return self.test, self.task, self.metric, self.relation
+        return self.test, self.task, self.metric, self.relation, self.number

@@ -94,7 +94,7 @@ class Metric:
         return self.kind != "value"
 
     def holds(self, value: float) -> bool:
-        """Whether it can have that value: a proportion in 0..1, another one none below its least."""
+        """Whether it can have that value: a proportion in 0..1, others from their least."""
         return 0 <= value <= 1 if self.bounded else self.least is None or value >= self.least
 
     @property

@@ -152,3 +152,24 @@ def test_it_repeats_until_the_claims_are_decided(pytester: pytest.Pytester) -> N
         ".//property[@name='repetitions']"
     )
     assert [item.get("value") for item in found] == ["10", "12", "10"]
+
+
+ALIKE = """
+    from tests.tiny import Falling
+
+    def test_falling(repeat):
+        for least in (0.9, 0.1):
+            repeat(Falling(0.5 + least / 10)).assert_at_least("landed", least)
+"""
+
+
+def test_each_of_several_claims_that_are_alike_is_told(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(ALIKE)
+    for more in (["--sim-output=a"], ["--sim-resume=a"]):
+        result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=5", *more)
+        result.assert_outcomes(passed=1)
+        result.stdout.fnmatch_lines(
+            ["UNDECIDED   1 of 2 claims hold, 1 undecided; 0 of 10 repetitions crashed",
+             "test_falling: landed >= 90 %  UNDECIDED 100 *",
+             "test_falling: landed >= 10 %  PASS 100 *"]
+        )  # fmt: skip
