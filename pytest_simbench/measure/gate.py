@@ -337,5 +337,7 @@ def _smallest_p(comparison: MeanDifference) -> float:
     if comparison.sole:
         return 0.0
     first, second = comparison.n
+    if min(first, second) < 2:
+        return 1.0
     arrangements = 2**first if comparison.paired else math.comb(first + second, first)
     return 1 / min(arrangements, PERMUTATIONS + 1)

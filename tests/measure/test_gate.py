@@ -286,6 +286,7 @@ def test_how_few_are_too_few() -> None:
     assert notes(5, 5) == ()
     assert "3 and 2 repetitions are too few" in notes(3, 2, seed=500)[0]
     assert notes(3, 3, seed=500) == ()  # 1 of 20 is 0.05
+    assert "20 and 1 repetitions are too few" in notes(20, 1)[0]  # one is told from no chance
     two = "placed:5%,ram:10%"
     assert notes(5, 5, two) == tuple(
         f"test_stacking[engine-headless]: 5 pairs are too few for a change of {name} to be "
