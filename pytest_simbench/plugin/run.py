@@ -50,6 +50,7 @@ class Run:
         reading: what the folder holds once the run is `complete`; empty before.
         mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
+        failing: whether a test of the resumed run that did not run again had failed.
         page: to look at, once the whole report is written.
         expected: what later tests will ask for; set before the first one asks.
     """
@@ -63,6 +64,7 @@ class Run:
         self.displays = Displays()
         self.reading = RunContents()
         self.mistake = ""
+        self.failing = False
         self.page: Path | None = None
         self.expected: Callable[[], Iterable[Experiment]] = tuple
         self._attempts: Counter[tuple[str, str, str]] = Counter()
@@ -266,6 +268,7 @@ class Run:
         for claim in {claim.identity: claim for claim in before if not claim.metric}.values():
             if claim.verdict == "FAIL" and claim.test in passed:
                 self.folder.claim(replace(claim, verdict="PASS", advice=""))
+            self.failing |= claim.verdict == "FAIL" and claim.test not in passed
 
     def complete(self) -> None:
         """Read what all processes wrote; called when all tests have ended."""
@@ -301,6 +304,7 @@ class Run:
             reporter.write_sep("=", title)
             reporter.write_line(text)
         baseline, report = found or ("", None)
+        passed = passed and not self.failing
         outcome = RunOutcome(passed, baseline, report, looks)
         problems.append(write_outcome(path, outcome))
         if badge := options.value(self.config, "sim_badge"):
