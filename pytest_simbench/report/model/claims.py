@@ -25,7 +25,7 @@ ORDER = ("FAIL", "UNDECIDED", "PASS")
 Metrics = Mapping[str, Sequence[Metric]]
 """What each task declares."""
 
-NO_CLAIM = "no claim was made"
+NO_CLAIM = "no claim was judged"
 
 
 @dataclass(frozen=True)

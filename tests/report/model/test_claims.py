@@ -60,7 +60,7 @@ def reading(*claims: Claim, records: Any = RECORDS) -> RunContents:
 def test_the_first_line_says_pass_or_fail_and_how_many_crashed() -> None:
     undecided = claim("sapien", "UNDECIDED", advice="about 9 more repetitions needed")
     for claims, sentence in (
-        ((), "no claim was made; 0 of 4 repetitions crashed"),
+        ((), "no claim was judged; 0 of 4 repetitions crashed"),
         ((claim(),), "PASS   1 of 1 claims hold; 0 of 4 repetitions crashed"),
         ((claim(), undecided), "UNDECIDED   1 of 2 claims hold, 1 undecided; 0 of 4 repetitions"),
         ((claim(), undecided, FAILED), "FAIL   1 of 3 claims fail, 1 undecided; 0 of 4"),
