@@ -183,7 +183,9 @@ def run_gate(
             (broken if typed else notes).append(f"{limit} compared nothing: {_told(reasons)}")
         else:
             apart = {test: why for test, why in reasons.items() if why != UNKNOWN}
-            notes += [f"{test}: {limit} is not tested: {why}" for test, why in apart.items()]
+            for test, why in apart.items():
+                lost = typed and why == LOST and after[test].ok
+                (broken if lost else notes).append(f"{test}: {limit} is not tested: {why}")
     notes += [
         f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
         f"to be significant among {len(changes)} comparisons"
@@ -293,7 +295,7 @@ def _rises(
 NO_MORE = Limit(CRASHED.name, 0.0, True)
 """What holds of crashes when nobody says anything: their share may not rise."""
 
-UNKNOWN = "it is not measured there"
+UNKNOWN, LOST = "it is not measured there", "no repetition of this run has a value"
 
 
 def _change(
@@ -301,7 +303,7 @@ def _change(
 ) -> Change | str:
     """The change of one metric, not yet corrected; else why there is none."""
     if not (limit.metric in old.known and limit.metric in new.known):
-        return UNKNOWN
+        return LOST if any(limit.metric in record.metrics for record in old.ok) else UNKNOWN
     metric = new.metric(limit.metric)
     if metric.better is None:
         return "neither direction of it is worse"
@@ -313,7 +315,7 @@ def _change(
     evened = without_speed(metric.name, old, new)
     first, second = evened or (old.by_seed(metric.name), new.by_seed(metric.name))
     if not first or not second:
-        return f"no repetition of {'this run' if first else 'the baseline'} has a value"
+        return LOST if first else "no repetition of the baseline has a value"
     worse: Alternative = "less" if metric.better == "higher" else "greater"
     sole = old.sole(metric.name) and new.sole(metric.name)
     comparison = compare_by_seed(first, second, "two-sided" if both_ways else worse, sole=sole)
