@@ -255,8 +255,11 @@ class Run:
         """Take over records that came with a report, from an xdist worker for instance."""
         self.folder.take_over(Record.from_json(line) for line in lines)
 
-    def judge(self, failed: Iterable[Mapping[str, Any]], passed: Collection[str]) -> None:
-        """Keep which tests failed as a whole; those of the resumed run that pass now do so no more.
+    def judge(
+        self, failed: Iterable[Mapping[str, Any]], passed: set[str], xfailed: Collection[str]
+    ) -> None:
+        """Keep which tests failed as a whole; those of the resumed run that pass now do so no more,
+        and what failed as expected is told as that.
 
         A run in which nothing was recorded keeps nothing.
         """
@@ -264,11 +267,15 @@ class Run:
             return
         for test in failed:
             self.folder.claim(Claim.from_dict(test))
-        before = self.folder.scan().claims if self.resumed else ()
-        for claim in {claim.identity: claim for claim in before if not claim.metric}.values():
-            if claim.verdict == "FAIL" and claim.test in passed:
-                self.folder.claim(replace(claim, verdict="PASS", advice=""))
-            self.failing |= claim.verdict == "FAIL" and claim.test not in passed
+            passed.discard(test["test"])  # its teardown failed
+        found = self.folder.scan().claims if self.resumed or xfailed else ()
+        for claim in {claim.identity: claim for claim in found}.values():
+            if claim.verdict == "FAIL" and claim.test in xfailed:
+                self.folder.claim(replace(claim, verdict="XFAIL"))
+            elif claim.verdict == "FAIL" and not claim.metric:
+                self.failing |= claim.test not in passed
+                if claim.test in passed:
+                    self.folder.claim(replace(claim, verdict="PASS", advice=""))
 
     def complete(self) -> None:
         """Read what all processes wrote; called when all tests have ended."""

@@ -20,7 +20,7 @@ from pytest_simbench.report.model.document import Column, Table, names
 MOST = 12
 """Claims that fail, or are not decided, which the first screen tells in full."""
 
-ORDER = ("FAIL", "UNDECIDED", "PASS")
+ORDER = ("FAIL", "UNDECIDED", "PASS", "XFAIL")
 
 Metrics = Mapping[str, Sequence[Metric]]
 """What each task declares."""
@@ -153,6 +153,8 @@ def _sentence(state: str, count: Counter[str], records: Sequence[Record]) -> str
         parts = [f"{count['PASS']} of {total} claims hold"]
     if count["UNDECIDED"]:
         parts.append(f"{count['UNDECIDED']} undecided")
+    if count["XFAIL"]:
+        parts.append(f"{count['XFAIL']} known to fail")
     return f"{state}   {', '.join(parts)}; {repetitions}"
 
 
