@@ -292,7 +292,8 @@ class LawHistory(History):
 def law_histories(records: Iterable[Record]) -> list[LawHistory]:
     """The histories of laws in a run: of each simulator with two or more releases and builds."""
     versions = (r for r in records if VersionedName.of(r.simulator).kind)
-    every = by_release(r for r in versions if r.settings.get(PHENOMENON))
+    ended = (r for r in versions if r.status != "interrupted")
+    every = by_release(r for r in ended if r.settings.get(PHENOMENON))
     found = []
     for of, laws in grouped(every, lambda at: at[1]._replace(parameters="")).items():
         known = {label for law in laws for label in every[law]}
