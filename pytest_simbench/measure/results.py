@@ -206,6 +206,8 @@ class ResultSet:
         self._assert_recorded()
         if self.crashed:
             self._refute("")
+        found = Judgement(Verdict.SUPPORTED, at_most(0.0), self._judged(CRASHED))
+        self.judged.append((CRASHED, found))
 
     def assert_crashed_at_most(self, share: float) -> None:
         """Fail when more than `share` (0..1) of all repetitions ever made would crash."""

@@ -333,3 +333,7 @@ def test_every_cause_is_a_failure(cause: str) -> None:
     assert result.crash_interval().mean == 0.25
     with pytest.raises(AssertionError, match=f"1 of 4 repetitions crashed: 1 x {cause} in settle"):
         result.assert_no_crashes()
+    fine = placed(1.0, 1.0)
+    fine.assert_no_crashes()
+    verdicts = [judged.verdict for of in (result, fine) for _, judged in of.judged]
+    assert verdicts == ["refuted", "supported"]  # that it held was not told
