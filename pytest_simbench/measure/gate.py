@@ -71,6 +71,12 @@ class Change:
         return self.p_value <= ALPHA
 
     @property
+    def by_chance(self) -> bool:
+        """Whether so many repetitions can change as much by chance, and seldom: not one value that
+        all repetitions have, which is certain, and not so few that nothing is ever seldom."""
+        return 0 < _smallest_p(self.comparison) <= ALPHA
+
+    @property
     def repetitions(self) -> str:
         """How many were compared, in words."""
         first, second = self.comparison.n
@@ -186,11 +192,12 @@ def run_gate(
             for test, why in apart.items():
                 lost = typed and why == LOST and after[test].ok
                 (broken if lost else notes).append(f"{test}: {limit} is not tested: {why}")
+    number = max(1, sum(change.by_chance for change in changes))
     notes += [
         f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
-        f"to be significant among {len(changes)} comparisons"
+        f"to be significant among {number} comparisons"
         for change in changes
-        if _smallest_p(change.comparison) * len(changes) > ALPHA * share
+        if _smallest_p(change.comparison) * number > ALPHA * share
     ]
     named = differences({test: (before[test].records, after[test].records) for test in common})
     return GateReport(
@@ -254,12 +261,12 @@ def _told(reasons: Mapping[str, str]) -> str:
 
 
 def _corrected(found: Iterable[Change | str], error: float = 1.0) -> tuple[Change, ...]:
-    """The changes that could be tested, with their p values corrected for their number, where they
-    have that share of the error."""
+    """The changes, with the p values of those that chance could bring corrected for their number,
+    where they have that share of the error."""
     changes = [change for change in found if isinstance(change, Change)]
-    p_values = holm([change.comparison.p_value for change in changes])
+    p_values = iter(holm([change.p_value for change in changes if change.by_chance]))
     return tuple(
-        replace(c, p_value=min(1.0, p / error)) for c, p in zip(changes, p_values, strict=True)
+        replace(c, p_value=min(1.0, next(p_values) / error)) if c.by_chance else c for c in changes
     )
 
 

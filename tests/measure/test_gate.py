@@ -292,6 +292,20 @@ def test_one_comparison_more_makes_each_less_sure() -> None:
     assert both.p_value == pytest.approx(2 / 2**8)
 
 
+def test_what_is_certain_and_what_nothing_can_show_make_nothing_less_sure() -> None:
+    """82 laws, each asked once, hid what a task beside them had lost."""
+    laws = [
+        record(1, test=f"test_law[{k}]", metrics={"placed": 1.0}).noting(sole=bool(k % 2))
+        for k in range(82)
+    ]
+    before, after = made([1.0] * 8), made([0.8] * 8)
+    alone = run(before, after, "placed:5%").changes[0]
+    (found,) = (
+        c for c in run([*laws, *before], [*laws, *after], "placed:5%").changes if c.exceeded
+    )
+    assert (found.test, found.p_value) == (alone.test, alone.p_value)
+
+
 def test_how_few_are_too_few() -> None:
     """The smallest p value of n pairs is 1 / 2^n, of n and m others 1 / (n + m over n)."""
 
