@@ -169,9 +169,14 @@ def test_one_that_fails_is_told_in_its_own_words(world: Worlds, how: str, told: 
         assert one.process.request("state")["time"] == pytest.approx(0.16, abs=0.021)
 
 
-def test_inside_too(world: Worlds) -> None:
+def test_inside_too_and_nothing_of_it_delays_the_next(
+    world: Worlds, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pytest_simbench.client.process.LOOK_PERIOD", 60.0)
+    one = world(stall_timeout=5.0)
     with pytest.raises(PolicyFailed, match="raised ValueError: too far"):
-        world().control(Waving(9.0), until=1.0, inside=True)
+        one.control(Waving(9.0), until=1.0, inside=True)
+    one.control(still, until=0.1)
 
 
 def test_a_repetition_fails_alone(case: Case) -> None:
