@@ -8,9 +8,10 @@ from __future__ import annotations
 import hashlib
 import inspect
 from abc import abstractmethod
+from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from copy import copy
+from copy import copy, deepcopy
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from threading import Lock
@@ -126,7 +127,7 @@ class GoalTask(Task):
         world.mark("start")
         with world.phase("act"):
             world.control(
-                copy(self.policy),  # other repetitions may be under way
+                _copied(self.policy),  # other repetitions may be under way
                 until=self.seconds if self.inside else stayed,
                 at_most=self.seconds,
                 rate=self.rate,
@@ -251,6 +252,16 @@ class PickAndPlace(GoalTask):
 @lru_cache(64)
 def _drawn(seed: int, low: tuple[float, ...], high: tuple[float, ...]) -> Any:
     return Randomness.of(seed).order.uniform(low, high)
+
+
+def _copied(policy: Any) -> Any:
+    """With arrays, lists and dicts of its own; a network, or what cannot be copied, is shared."""
+    own = copy(policy)
+    for name, value in getattr(own, "__dict__", {}).items():
+        if isinstance(value, np.ndarray | list | dict | set | deque):
+            with suppress(Exception):
+                own.__dict__[name] = deepcopy(value)
+    return own
 
 
 def name_of(policy: Any) -> str:

@@ -108,3 +108,19 @@ def test_the_motion_is_kept_for_the_replay(case: Case) -> None:
     times = np.load(trace)["time"]
     assert times.size >= 75
     assert (np.diff(times) > 0).all()
+
+
+@pytest.mark.engine
+def test_what_a_policy_gathers_in_one_repetition_is_not_in_the_next(case: Case) -> None:
+    class Gathering:
+        def __init__(self) -> None:
+            self.rows, self.sum = [0.0], np.zeros(1)
+
+        def act(self, seen: Observation) -> None:
+            self.rows.append(seen.time)
+            self.sum += len(self.rows)
+
+    policy = Gathering()
+    record = performed(case, Reaching(policy, seconds=0.2, rate=10.0))
+    assert [*policy.rows, *policy.sum] == [0.0, 0.0]
+    assert record.settings["task.policy_digest"] == digest(Gathering())
