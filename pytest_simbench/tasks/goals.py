@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import re
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -27,6 +28,7 @@ from pytest_simbench.scene import Box, Pose, Robot, Scene
 from pytest_simbench.scene.policy import Function, Observation
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Randomness, Task, cube
 from pytest_simbench.tasks.pushing import BLOCK_MASS, BLOCK_SIZE, FRICTION, RED
+from pytest_simbench.worker.wire import pack
 
 HELD = 0.5
 """What is at its goal for so long [s] has come to stay."""
@@ -278,11 +280,13 @@ _PARSING = Lock()
 def digest(policy: Any) -> str:
     """Of a policy's source and of the numbers and texts that it holds; others (the weights of a
     network, for instance) do not count."""
-    text = [name_of(policy)]
+    text, held = [name_of(policy)], {**getattr(policy, "__dict__", {})}
     made = policy._act if isinstance(policy, Function) else policy
+    with suppress(TypeError):
+        held |= inspect.getclosurevars(made).nonlocals
     with suppress(OSError, TypeError), _PARSING:
         text.append(inspect.getsource(made if inspect.isroutine(made) else type(made)))
-    for name, value in sorted(getattr(policy, "__dict__", {}).items()):
-        if isinstance(value, int | float | str | list | tuple | dict | np.ndarray):
-            text.append(f"{name}={value!r}")
+    for name, value in sorted(held.items()):
+        if isinstance(value, int | float | str | list | tuple | dict | np.ndarray | np.generic):
+            text.append(re.sub(" at 0x[0-9a-f]+", "", f"{name}={pack(value)!r}"))
     return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,10 +76,21 @@ def test_a_record_tells_which_policy_it_was() -> None:
     class Held:
         gain = 1.0
 
-        def __init__(self, gain: float) -> None:
+        def __init__(self, gain: Any) -> None:
             self.gain = gain
 
-    assert digest(Held(1.0)) == digest(Held(1.0)) != digest(Held(2.0))
+    large = np.zeros(2000)
+    for one, other in (
+        (1.0, 2.0), ([1], (2,)), (np.float32(1), np.float32(2)), ([large], [large + 1e-12]),
+    ):  # fmt: skip
+        assert digest(Held(one)) == digest(Held(one)) != digest(Held(other))
+    kept = [Held(1.0), Held(1.0)]  # each stands somewhere else in memory
+    assert digest(Held(kept[:1])) == digest(Held(kept[1:]))
+
+    def closed(gain: float) -> Callable[[Observation], float]:
+        return lambda seen: gain
+
+    assert digest(closed(1.0)) == digest(closed(1.0)) != digest(closed(2.0))
 
 
 @pytest.mark.engine
