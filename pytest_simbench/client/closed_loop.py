@@ -28,6 +28,7 @@ from pytest_simbench.scene.policy import (
     checked,
 )
 from pytest_simbench.scene.set_points import SetPoints, Sight
+from pytest_simbench.worker.loop import raised
 from pytest_simbench.worker.wire import named
 
 PLAIN = (bool, int, float, str, bytes, type(None), list, tuple, dict, np.ndarray, np.generic)
@@ -88,12 +89,8 @@ class Watched:
             return policy(*arguments)
         except (WorkerError, PolicyError):
             raise
-        except Exception as error:
-            line = error.__traceback__ and error.__traceback__.tb_next
-            at = (
-                f" ({Path(line.tb_frame.f_code.co_filename).name}:{line.tb_lineno})" if line else ""
-            )
-            raise self.failed(f"raised {named(error)}{at}") from error
+        except (Exception, SystemExit) as error:
+            raise self.failed(raised(error)) from error
         finally:
             self._since = None
             self.seconds += time.monotonic() - began

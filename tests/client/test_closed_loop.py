@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -26,7 +27,7 @@ from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.scene.policy import Command, LoopError, Observation, Policy
 from pytest_simbench.tasks import Reaching
 from pytest_simbench.tasks.base import cube
-from tests.client.waving import Waving, still
+from tests.client.waving import Waving, still, writing
 
 SCENE = Scene("arm", (cube("a", Pose.at(0.5, 0.3, 0.025), (1.0,) * 4),), panda())
 Worlds = Callable[..., World]
@@ -144,6 +145,8 @@ class Failing(Policy):
             return None
         if self.how == "stalls":
             time.sleep(30.0)
+        if self.how == "exits":
+            sys.exit(3)
         if self.how == "raises":
             raise RuntimeError("the network is away")
         return np.full(7, np.nan)
@@ -156,6 +159,7 @@ class Failing(Policy):
             "raises",
             r"policy failing raised RuntimeError: the network is away \(test_closed_loop.py",
         ),
+        ("exits", "policy failing raised SystemExit: 3"),
         ("answers NaN", "the policy answers position with a number that is not finite"),
         ("stalls", "policy failing gave no answer for 2 s"),
     ],
@@ -174,9 +178,15 @@ def test_inside_too_and_nothing_of_it_delays_the_next(
 ) -> None:
     monkeypatch.setattr("pytest_simbench.client.process.LOOK_PERIOD", 60.0)
     one = world(stall_timeout=5.0)
-    with pytest.raises(PolicyFailed, match="raised ValueError: too far"):
+    with pytest.raises(PolicyFailed, match=r"raised SystemExit: too far \(waving.py:2"):
         one.control(Waving(9.0), until=1.0, inside=True)
     one.control(still, until=0.1)
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_what_it_sees_is_not_for_writing(world: Worlds, inside: bool) -> None:
+    with pytest.raises(PolicyFailed, match="read-only"):
+        world().control(writing, until=0.1, inside=inside)
 
 
 def test_a_repetition_fails_alone(case: Case) -> None:
