@@ -25,7 +25,7 @@ from pytest_simbench.motion.model import grasping_scale_of, scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Robot, Scene
-from pytest_simbench.scene.policy import Function, Observation
+from pytest_simbench.scene.policy import Function, Observation, checked
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Randomness, Task, cube
 from pytest_simbench.tasks.pushing import BLOCK_MASS, BLOCK_SIZE, FRICTION, RED
 from pytest_simbench.worker.wire import pack
@@ -70,6 +70,9 @@ class GoalTask(Task):
     inside: bool = False
     settle: float = 0.5
     robot: Robot | None = None
+
+    def __post_init__(self) -> None:
+        checked(self.tolerance, "the tolerance [m] of a goal", above=True)
 
     @cached_property  # asked at each observation
     def arm(self) -> Robot:
