@@ -55,6 +55,12 @@ def shipped(policy: Policy, seed: int, goal: Pose | None) -> dict[str, Any]:
             f"the policy {made.__qualname__} is not at the top of its module, and cannot run "
             "inside the worker"
         )
+    if made.__module__ == "__main__" and "__main__" not in source:
+        raise PolicyError(
+            f"the policy {policy.name} stands in the script that was started, which would run "
+            "again inside the worker; put it into a file of its own, or the rest of the script "
+            "under if __name__ == '__main__'"
+        )
     odd = sorted(name for name, value in state.items() if not isinstance(value, PLAIN))
     if odd:
         raise PolicyError(

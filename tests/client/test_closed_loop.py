@@ -242,6 +242,14 @@ def test_what_cannot_run_inside(world: Worlds, policy: Any, told: str) -> None:
         one.control(policy, until=0.1, inside=True)
 
 
+def test_a_script_does_not_start_itself_again(
+    world: Worlds, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(still, "__module__", "__main__")
+    with pytest.raises(PolicyFailed, match="would run again inside the worker"):
+        world().control(still, until=0.1, inside=True)
+
+
 def test_what_does_not_travel(world: Worlds) -> None:
     policy = Waving(0.1)
     policy.lock = threading.Lock()  # type: ignore[attr-defined]
