@@ -49,7 +49,7 @@ def _policy(path: Path, name: str, given: Any) -> Any:
         policy = as_policy(given)
     except SceneError as error:
         raise PolicyError(f"{path}: {error}") from None
-    if getattr(policy, "name", Policy.name) == Policy.name:
+    if getattr(policy, "name", Policy.name) in (Policy.name, "<lambda>"):
         with suppress(AttributeError):  # an object that takes no attributes keeps what it has
             policy.name = name
     return policy
