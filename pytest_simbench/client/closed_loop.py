@@ -251,7 +251,7 @@ class Episode:
     Attributes:
         policy: whatever has `act`.
         rhythm: how often, and how late.
-        until: simulated seconds, or what ends the loop once it holds of an observation.
+        until: simulated seconds, or what ends the loop once it holds of what is (undelayed).
         at_most: seconds that the loop lasts if that never holds.
         looking: what the policy is shown beside the state.
         inside: whether it runs in the worker.
@@ -316,7 +316,7 @@ class Episode:
             )  # fmt: skip
             try:
                 going = True
-                while going and not (callable(self.until) and self.until(loop.observation)):
+                while going and not (callable(self.until) and self.until(loop.now)):
                     going = loop.reply(watched.ask(self.policy.act, loop.observation))
                     states.append(loop.now)
                 loop.end()

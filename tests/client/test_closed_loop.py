@@ -109,6 +109,8 @@ def test_it_ends_when_it_shall(world: Worlds) -> None:
     assert one.time == pytest.approx(0.1)
     one.control(still, until=lambda seen: False, at_most=0.1)
     assert one.time == pytest.approx(0.2)
+    one.control(still, until=lambda seen: seen.time >= 0.3 - 1e-9, observation_delay=0.04)
+    assert one.time == pytest.approx(0.3)  # what is seen late does not end late
 
 
 def test_forces_and_pictures_are_shown_where_they_are_asked_for(world: Worlds) -> None:
