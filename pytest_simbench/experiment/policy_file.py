@@ -66,9 +66,7 @@ def _imported(path: Path) -> Any:
     sys.path.insert(0, str(where.parent))
     try:
         spec.loader.exec_module(module)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # sys.exit in a module, for instance
+    except (Exception, SystemExit) as error:
         why = " ".join(named(error).split())[:300]
         raise PolicyError(f"{path} cannot be imported: {why}") from None
     finally:

@@ -286,15 +286,10 @@ def _transfer(records: Sequence[Record]) -> Transfer | None:
             name += f" {str(r.settings.get(DIGEST))[:6]}" if twice[name] > 1 else ""
             of.setdefault(name, {})[r.seed] = float(value)
     have = {who: {p for p in of if len(of[p]) >= FEWEST} for who, of in found.items()}
-
-    def sharing(own: set[str]) -> list[Who]:
-        return [who for who in have if own <= have[who]]
-
-    def shared(own: set[str]) -> tuple[bool, int, int]:
-        return len(sharing(own)) > 1, len(own), len(sharing(own))
-
-    own = max(have.values(), key=shared, default=set())  # the most that two simulators have
-    policies, whole = sorted(own), sharing(own)
+    sharing = [(own, [who for who in have if own <= have[who]]) for own in have.values()]
+    # The most that two simulators have.
+    own, whole = max(sharing, key=lambda of: (len(of[1]) > 1, *map(len, of)), default=(set(), []))
+    policies = sorted(own)
     every = [found[who][policy].keys() for who in whole for policy in policies]
     seeds = sorted(frozenset(every[0]).intersection(*every[1:])) if every else []
     if len(whole) < 2 or len(policies) < 2 or len(seeds) < FEWEST:

@@ -182,14 +182,14 @@ class SetPoints:
         return self._kinematics.towards(self.position, tool, self._period)
 
     def _finger(self, width: float) -> float:
-        found = _numbers(width, "gripper")
-        if found.size != 1:
-            raise PolicyError(f"the policy answers gripper of shape {found.shape}, not one number")
-        value = float(found.item())
+        value = _numbers(width, "gripper")
+        if value.size != 1:
+            raise PolicyError(f"the policy answers gripper of shape {value.shape}, not one number")
         if not len(self._fingers):
             raise PolicyError(f"the policy moves the gripper; robot {self._robot.name!r} has none")
         low, high = sorted((self._robot.gripper.closed, self._robot.gripper.opened))
-        wanted = value / 2 if self._kinematics is None else self._kinematics.finger(value)
+        width = value.item()
+        wanted = width / 2 if self._kinematics is None else self._kinematics.finger(width)
         return float(np.clip(wanted, low, high))
 
 

@@ -16,6 +16,7 @@ from copy import copy, deepcopy
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from threading import Lock
+from types import MethodType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -259,13 +260,21 @@ def _drawn(seed: int, low: tuple[float, ...], high: tuple[float, ...]) -> Any:
     return Randomness.of(seed).order.uniform(low, high)
 
 
+KEPT = list, dict, set, deque, MethodType
+"""What a policy changes in place while it acts. A method changes what it is bound to."""
+
+
 def _copied(policy: Any) -> Any:
-    """With arrays, lists and dicts of its own; a network, or what cannot be copied, is shared."""
-    own = copy(policy)
-    for name, value in getattr(own, "__dict__", {}).items():
-        if isinstance(value, np.ndarray | list | dict | set | deque):
+    """With arrays, lists and dicts of its own; a network, or what cannot be copied, is shared, and
+    so are arrays of which one is a view of another."""
+    own = copy(policy)  # a function is not copied
+    held, known = {} if own is policy else getattr(own, "__dict__", {}), {id(policy): own}
+    arrays = [value for value in held.values() if isinstance(value, np.ndarray)]
+    linked = any(one.base is other for one in arrays for other in arrays)
+    for name, value in held.items():
+        if isinstance(value, KEPT if linked else (*KEPT, np.ndarray)):
             with suppress(Exception):
-                own.__dict__[name] = deepcopy(value)
+                held[name] = deepcopy(value, known)
     return own
 
 

@@ -128,10 +128,18 @@ def test_what_a_policy_gathers_in_one_repetition_is_not_in_the_next(case: Case) 
     class Gathering:
         def __init__(self) -> None:
             self.rows, self.sum = [0.0], np.zeros(1)
+            self.same, self.way, self.ways = self.rows, self.gather, [self.gather]
+            self.count = 1
 
         def act(self, seen: Observation) -> None:
-            self.rows.append(seen.time)
+            self.way(seen.time)
+            self.ways[0](seen.time)
+            assert len(self.same) == len(self.rows) == self.count
+
+        def gather(self, time: float) -> None:
+            self.rows.append(time)
             self.sum += len(self.rows)
+            self.count += 1
 
     policy = Gathering()
     record = performed(case, Reaching(policy, seconds=0.2, rate=10.0))
