@@ -113,6 +113,15 @@ def test_it_ends_when_it_shall(world: Worlds) -> None:
     assert one.time == pytest.approx(0.3)  # what is seen late does not end late
 
 
+def test_from_a_kept_state_it_acts_as_it_did_there(world: Worlds) -> None:
+    one, ways = world(), []
+    one.save()
+    for _ in range(2):
+        ways.append(one.control(Waving(0.3), until=0.5).joints)
+        one.restore()
+    np.testing.assert_array_equal(*ways)
+
+
 def test_forces_and_pictures_are_shown_where_they_are_asked_for(world: Worlds) -> None:
     one, shown = world(), []
     one.wait(0.2)
