@@ -158,13 +158,14 @@ class Repetition:
         """The record as a reader of its line has it, where a number that is none is None.
 
         Raises:
-            RecordError: no reader takes it, or a metric cannot have its value.
+            RecordError: no reader takes it, or a proportion is not in 0..1.
         """
         task = self.experiment.task
         found = Record.from_dict(record.to_dict(), f"the outcome of {task.name}")
         for metric in task.metrics:
             value = found.metrics.get(metric.name)
-            if value is not None and not metric.holds(value):
+            # A distance below 0 may be rounding; a share beyond 1 is a mistake.
+            if value is not None and metric.bounded and not metric.holds(value):
                 raise RecordError(f"{metric.name} of {task.name} cannot be {value:g}")
         return found
 
