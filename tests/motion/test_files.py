@@ -184,6 +184,14 @@ def more(text: str, before: str = "") -> Change:
 
 
 HULLS = "hull_corners = 99"
+
+
+def test_a_package_also_holds_the_link_pairs_of_an_arm_with_hulls(tmp_path: Path) -> None:
+    (tmp_path / "small.srdf").write_text('<robot name="small"/>')
+    toml = TOML.replace("[arm]", 'srdf = "package://mine/small.srdf"\npackages.mine = "."\n[arm]')
+    assert read_robot(small_arm(tmp_path, f"{HULLS}\n{toml}")).srdf
+
+
 SWING = "[throw]\nstart = [0.1, 0.2, 0.3]\nend = "
 LOOP = '<mimic joint="right_finger"/></joint>'
 SRDF = swap("[arm]", 'srdf = "small.toml"\n[arm]')
