@@ -58,8 +58,8 @@ ASIDE = 0.25
 """By which share of the clearance the arm aims beside the hole at most, in x and in y."""
 
 ABOVE, STEP, SLOW = 0.005, 0.002, 0.3
-"""From where the peg is lowered, above the chamfer, and how far at a time [m]; at which share of
-the joints' speed limits."""
+"""From where the peg is lowered, above the chamfer, and about how far at a time [m]; at which share
+of the joints' speed limits."""
 
 JUDGED = 3.0
 
@@ -235,8 +235,11 @@ class Inserting(Task):
         """Straight down, step by step, and the force of the hole on the peg after each [N]; none
         where the simulator does not tell forces of this scene."""
         names = [body.name for body in self.hole()]
-        for _ in range(round((ABOVE + CHAMFER + self.depth) / STEP)):
-            hand.move_straight(hand.tool.translated(z=-STEP), speed=SLOW, ignored=tuple(names))
+        whole = ABOVE + CHAMFER + self.depth
+        steps = round(whole / STEP)
+        for _ in range(steps):
+            down = hand.tool.translated(z=-whole / steps)
+            hand.move_straight(down, speed=SLOW, ignored=tuple(names))
             found = told_forces(hand.world)
             if found is None:
                 continue

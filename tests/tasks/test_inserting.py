@@ -66,11 +66,12 @@ def test_the_hole_is_as_wide_as_it_says(section: Section, clearance: float) -> N
     assert filled(inside + CHAMFER / 2 + 1e-6, 0.0, HIGH + CHAMFER / 2)
 
 
-@pytest.mark.parametrize("section", SECTIONS)
-def test_a_perfect_arm_inserts(section: Section) -> None:
-    outcome = inserted(Inserting(section, 2e-3))
+@pytest.mark.parametrize(("section", "depth"), [("square", 25), ("round", 25), ("square", 4)])
+def test_a_perfect_arm_inserts(section: Section, depth: float) -> None:
+    """As deep as it is told, also where that is no whole number of steps."""
+    outcome = inserted(Inserting(section, 2e-3, depth / 1000))
     assert outcome.metrics == pytest.approx(
-        {"inserted": 1.0, "depth": 25.0, "overlap": 0.0, "force": 5.0}, abs=1e-3
+        {"inserted": 1.0, "depth": depth, "overlap": 0.0, "force": 5.0}, abs=1e-3
     )
     assert outcome.reasons == ()
     assert 0.0 < np.abs(outcome.details["aside"]).max() < ASIDE * 2e-3 <= 2e-3 / 2
