@@ -98,7 +98,7 @@ class Inserting(Task):
             Metric("inserted", "inserted", kind="yes_no",
                    doc="its end is in the hole by 0.8 of the depth that was told, or more"),
             Metric("depth", "depth", unit="mm", better=None,
-                   doc="of the middle of its end in the hole"),
+                   doc="of the middle of its end in the hole, where it is over that"),
             Metric("overlap", "overlap", unit="mm", better="lower", least=0, resolution=0.01,
                    doc="of peg and hole at the end, the deepest"),
             Metric("force", "peak force", unit="N", better=None, least=0,
@@ -215,13 +215,13 @@ class Inserting(Task):
             reasons.append(str(error))
         world.mark("end")
         pose = world.pose("peg")
-        depth = HIGH - (pose * Pose.at(0.0, 0.0, -LONG / 2)).position[2]
+        *beside, depth = np.subtract((*HOLE, HIGH), (pose * Pose.at(0.0, 0.0, -LONG / 2)).position)
         inserted = not reasons and depth > 0.8 * self.depth
         count(int(inserted), 1)
         peg = self.peg(Pose()).moved_to(pose)
         found: dict[str, float | None] = {
             "inserted": float(inserted),
-            "depth": 1000 * depth,
+            "depth": 1000 * float(depth) if np.hypot(*beside) < WIDE / 2 else None,
             "overlap": 1000 * max(0.0, *(penetration(peg, body) for body in self.hole())),
             "force": max(forces, default=None),
         }

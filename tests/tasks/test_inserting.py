@@ -89,8 +89,8 @@ def test_what_stands_in_a_wall_and_what_falls_are_told() -> None:
     assert outcome.metrics["overlap"] == pytest.approx(0.5 + beside, abs=1e-3)
     short = inserted(Inserting(clearance=2e-3), Mishap("insert", 0.1, slip(z=-0.01)))
     assert (short.metrics["inserted"], short.metrics["depth"]) == (0.0, pytest.approx(15, abs=1e-3))
-    fallen = inserted(Inserting(), Mishap("bring", 0.2, slip(z=-0.05)))
-    assert fallen.metrics["inserted"] == 0.0
+    fallen = inserted(Inserting(), Mishap("bring", 0.2, slip(x=0.05)))
+    assert (fallen.metrics["inserted"], fallen.metrics["depth"]) == (0.0, None)
     assert fallen.reasons == ("peg is not in the hand",)
 
 
