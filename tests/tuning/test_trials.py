@@ -108,3 +108,11 @@ def test_a_smaller_step_that_never_works(tmp_path: Path) -> None:
     looks, _ = trials(tmp_path, lambda s, k: None if s["timestep"] < 0.001 else 1.0, of)
     with pytest.raises(TuningError, match="8 times as many steps cannot be judged: it hangs"):
         looks.today()
+
+
+def test_a_smaller_step_that_has_no_value(tmp_path: Path) -> None:
+    """Else each candidate would be right, and the cheapest recommended."""
+    of = replace(target(), converged=True)
+    looks, _ = trials(tmp_path, lambda s, k: float("nan"), of)
+    with pytest.raises(TuningError, match="cannot be judged: none has a cost and an error"):
+        looks.today()
