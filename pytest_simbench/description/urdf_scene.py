@@ -133,7 +133,10 @@ class _World(Description):
             tool_frame=self.root,
             couplings=couplings,
         )
-        lift = max(0.0, -_lowest(robot))
+        try:
+            lift = max(0.0, -_lowest(robot))
+        except DescriptionError as error:  # of the file that is kept
+            raise DescriptionError(str(error).replace(robot.urdf, self.path)) from None
         robot = replace(robot, base=Pose.at(0.0, 0.0, lift))
         self._tell_all(moving, lift)
         name = path.stem.strip(" .") or "scene"
