@@ -280,7 +280,7 @@ def _with_files(robot: Robot, hand: _Hand, srdf: str | None) -> Robot:
 
 
 def _standing(robot: Robot) -> Robot:
-    """The robot, if the arm carries the hand, and nothing touches where it begins."""
+    """The robot, if the arm carries the hand, can throw so, and nothing touches where it begins."""
     model = RobotModel(robot)
     carrier = model.pin.frames[model.tool].parentJoint
     if carrier != model.arm:
@@ -288,6 +288,8 @@ def _standing(robot: Robot) -> Robot:
             f"the tool frame {robot.tool_frame!r} hangs on {model.pin.names[carrier]!r}, not on "
             f"{model.pin.names[model.arm]!r}, the last joint of the arm"
         )
+    if any((np.clip(arm, model.lower, model.upper) != arm).any() for arm in robot.swing or ()):
+        raise DescriptionError("[throw]: start or end lies outside the limits of the joints")
     ready = robot.column("initial_position")[: model.arm]
     touching = PlanningScene(model, Scene("ready", (), robot)).collision(ready)
     if touching is not None:

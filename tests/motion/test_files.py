@@ -287,6 +287,9 @@ IN_TOML = {
         lambda text: swap('"grip"', '"grab"')(text) + "xyz = [0.0, 0.0, 0.0]\n",
         r"the tool frame 'grab' is no link; choose from foot, column, upper, lower",
     ),
+    "a swing out of the limits": (
+        more(SWING + "[0.4, 0.5, 2.6]"), r"\[throw\]: start or end lies outside the limits of the j"
+    ),
     "a swing of too few angles": (more(SWING + "[0.4, 0.5]"), r"\[throw\]: end: give it 3 numbers"),
     "a swing with more in it": (
         more(SWING + "[0.4, 0.5, 0.6]\nstop = 1"), r"\[throw\]: 'stop' means nothing here; valid: "
