@@ -48,7 +48,11 @@ def runs_in(path: Path, executor: Executor) -> Iterator[Runs]:
     folder = RunFolder(path)
     with refusing(FolderError):
         folder.lock()
-    with closing(folder), refusing(NotResumed):
+    with closing(folder), refusing(NotResumed, kind=_elsewhere):
         with refusing(RecordError):
             resumed = Resumed(folder) if folder.holds_run else None
         yield Runs(executor, printed(True), folder, resumed)
+
+
+def _elsewhere(why: str) -> BadInput:
+    return BadInput(f"{why}; begin anew in another folder: --output DIR")
