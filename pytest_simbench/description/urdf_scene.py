@@ -18,16 +18,7 @@ from pytest_simbench.description.shapes import capsule_hull, cylinder_hull, own_
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.description.urdf_check import MOVING, Description, read_xml
 from pytest_simbench.ground.errors import DescriptionError
-from pytest_simbench.scene import (
-    Coupling,
-    Gripper,
-    Joint,
-    Polytope,
-    Pose,
-    Robot,
-    Scene,
-    SceneError,
-)
+from pytest_simbench.scene import Coupling, Gripper, Joint, Polytope, Pose, Robot, Scene, SceneError
 from pytest_simbench.scene.robot import FASTEST, FREE, WIDEST
 
 ABOVE = 3

@@ -234,12 +234,11 @@ class Inserting(Task):
     def lower(self, hand: Manipulator, forces: list[float]) -> None:
         """Straight down, step by step, and the force of the hole on the peg after each [N]; none
         where the simulator does not tell forces of this scene."""
-        names = [body.name for body in self.hole()]
+        names = tuple(body.name for body in self.hole())
         whole = ABOVE + CHAMFER + self.depth
         steps = round(whole / STEP)
         for _ in range(steps):
-            down = hand.tool.translated(z=-whole / steps)
-            hand.move_straight(down, speed=SLOW, ignored=tuple(names))
+            hand.move_straight(hand.tool.translated(z=-whole / steps), speed=SLOW, ignored=names)
             found = told_forces(hand.world)
             if found is None:
                 continue

@@ -170,7 +170,6 @@ def test_one_that_cannot_be_judged_holds_up_no_other(
 def test_of_what_no_index_has_nothing_is_watched(
     name: str, work: list[list[str]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Neither of what the system has nor of a program of the user's own."""
     assert main(["watch", name]) == 2
     assert f"{name}: no package index has its releases; choose from d" in capsys.readouterr().err
     assert work == []
