@@ -9,9 +9,10 @@ from collections.abc import Iterable
 import numpy as np
 from tables import DATA, NAMES, table
 
-from pytest_simbench.measure.transfer import METRIC, POLICY, Ceiling
+from pytest_simbench.measure.transfer import METRIC, POLICY, Ceiling, Transfer
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.model.transfer import interval
+from pytest_simbench.report.markdown.run import table as columns
+from pytest_simbench.report.model.transfer import interval, section
 
 FILE, TASK = DATA / "transfer.csv", "pushing_to_goal"
 FIRST, LAST = 2000, 10_000
@@ -40,16 +41,33 @@ def read(records: Iterable[Record]) -> None:
             writer.writerow((*key, "".join(found[key][seed] for seed in seeds)))
 
 
-def ceilings() -> str:
-    """A row for each simulator: success of the best and the worst but the limp one, and how far its
-    rankings can be trusted."""
-    kept, rows = signs(), []
-    for simulator, name in NAMES.items():
-        of = [np.array([*line]) == "1" for (whose, _), line in kept.items() if whose == simulator]
-        if of:
-            ceiling = Ceiling(np.array(of, dtype=float))
-            shares = sorted(100 * line.mean() for line in of)
-            spread = f"{shares[1]:.0f} to {shares[-1]:.0f}"
-            told = interval(ceiling.tau)
-            rows.append((name, str(len(of[0])), spread, told, f"{ceiling.needed or 'any'}"))
-    return table(("simulator", "seeds", "success %", "ceiling of tau-b", "seeds it takes"), rows)
+def transfer() -> Transfer:
+    """All simulators, and the seeds that all of them have; policies by success, best first."""
+    kept = signs()
+    own = [name for name in NAMES if any(name == who for who, _ in kept)]
+    policies = sorted({policy for _, policy in kept})
+    seeds = min(map(len, kept.values()))
+    rows = [[[*kept[who, policy][:seeds]] for policy in policies] for who in own]
+    outcomes = (np.array(rows) == "1").astype(float)
+    order = np.argsort(-outcomes.sum((0, 2)))
+    whole = [(who, "headless", "tuned") for who in own]
+    return Transfer(TASK, [policies[k] for k in order], whole, outcomes[:, order])
+
+
+def matrix() -> str:
+    """Success of each policy on each simulator with all of its seeds, and how far its rankings can
+    be trusted."""
+    kept, found, rows = signs(), transfer(), []
+    for who, _, _ in found.simulators:
+        outcomes = np.array([[*kept[who, policy]] for policy in found.policies]) == "1"
+        ceiling = Ceiling(outcomes.astype(float))
+        shares = [f"{100 * share:.0f}" for share in outcomes.mean(1)]
+        told = str(outcomes.shape[1]), interval(ceiling.tau), f"{ceiling.needed or 'any'}"
+        rows.append((NAMES[who], *shares, *told))
+    heads = "seeds", "ceiling of tau-b", "seeds it takes"
+    return table(("success %", *found.policies, *heads), rows)
+
+
+def ranks() -> str:
+    """tau-b of each two simulators, and their ceilings, as a report has them."""
+    return columns(section(transfer()).tables[1].columns)

@@ -26,6 +26,7 @@ from pytest_simbench.measure.bisection import (
     between,
     difference,
     first_worse,
+    has_value,
     like_the_bad_one,
     steps,
 )
@@ -56,7 +57,7 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
     metric = search.metric()
     good, bad = search.result(0), search.result(last)
     for end, place in ((good, 0), (bad, last)):
-        if not (end.values(metric.name) if metric.name in end.known else len(end)):
+        if not has_value(metric, end):
             raise BadInput(f"{search.describe(place)}, so nothing tells worse")
     found = difference(metric, good, bad)
     if not found.significant():
@@ -74,11 +75,12 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
         return worse
 
     place = first_worse(len(releases), is_worse)
-    before = search.result(place - 1)
-    p_value = difference(metric, before, search.result(place)).p_value if before.ok else 1.0
+    sides = search.result(place - 1), search.result(place)
+    known = all(has_value(metric, side) for side in sides)
+    sure = f" (p = {difference(metric, *sides).p_value:.2g})" if known else ""
     print(
         f"the first worse release is {releases[place]}: {search.describe(place - 1)}, "
-        f"{search.describe(place)} (p = {p_value:.2g})"
+        f"{search.describe(place)}{sure}"
     )
     print(f"results: {search.folder}")
     return 0

@@ -131,6 +131,9 @@ def merge_runs(
         problems = [*_problems(readings), *refused, *unsaved, *written.problems, *wrong]
         ended = RunOutcome(outcome.passed, looks=outcome.looks)
         problems.append(write_outcome(folder.path, ended))
+        problems += [f"pytest --sim-resume={folder.path} judges the claims of the whole"] * any(
+            found.claims for found in readings.values()
+        )
         problems += _extras(folder.path, folder.path, reading.records, outcome, **more)
         _print(written, verbose, problems)
         if written.complete and not unsaved:

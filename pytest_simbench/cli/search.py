@@ -102,8 +102,9 @@ class Search:
         """What a release scored, in words."""
         name, result = self.metric_name, self.result(place)
         crashed = f", {len(result.crashed)} crashed" if result.crashed else ""
-        if name in result.known and result.values(name):
+        if name in result.known:
             mean = result.metric(name).format(result.interval(name).mean)
+            mean = mean if result.values(name) else "is not there"
             return f"{self.releases[place]} {name} {mean}{crashed}"
         return f"{self.releases[place]} {len(result.crashed)} of {len(result)} crashed"
 

@@ -28,6 +28,7 @@ from pytest_simbench.scene.policy import (
     checked,
 )
 from pytest_simbench.scene.set_points import SetPoints, Sight
+from pytest_simbench.worker.loop import raised
 from pytest_simbench.worker.wire import named
 
 PLAIN = (bool, int, float, str, bytes, type(None), list, tuple, dict, np.ndarray, np.generic)
@@ -53,6 +54,12 @@ def shipped(policy: Policy, seed: int, goal: Pose | None) -> dict[str, Any]:
         raise PolicyError(
             f"the policy {made.__qualname__} is not at the top of its module, and cannot run "
             "inside the worker"
+        )
+    if made.__module__ == "__main__" and "__main__" not in source:
+        raise PolicyError(
+            f"the policy {policy.name} stands in the script that was started, which would run "
+            "again inside the worker; put it into a file of its own, or the rest of the script "
+            "under if __name__ == '__main__'"
         )
     odd = sorted(name for name, value in state.items() if not isinstance(value, PLAIN))
     if odd:
@@ -88,12 +95,8 @@ class Watched:
             return policy(*arguments)
         except (WorkerError, PolicyError):
             raise
-        except Exception as error:
-            line = error.__traceback__ and error.__traceback__.tb_next
-            at = (
-                f" ({Path(line.tb_frame.f_code.co_filename).name}:{line.tb_lineno})" if line else ""
-            )
-            raise self.failed(f"raised {named(error)}{at}") from error
+        except (Exception, SystemExit) as error:
+            raise self.failed(raised(error)) from error
         finally:
             self._since = None
             self.seconds += time.monotonic() - began
@@ -248,7 +251,7 @@ class Episode:
     Attributes:
         policy: whatever has `act`.
         rhythm: how often, and how late.
-        until: simulated seconds, or what ends the loop once it holds of an observation.
+        until: simulated seconds, or what ends the loop once it holds of what is (undelayed).
         at_most: seconds that the loop lasts if that never holds.
         looking: what the policy is shown beside the state.
         inside: whether it runs in the worker.
@@ -313,7 +316,7 @@ class Episode:
             )  # fmt: skip
             try:
                 going = True
-                while going and not (callable(self.until) and self.until(loop.observation)):
+                while going and not (callable(self.until) and self.until(loop.now)):
                     going = loop.reply(watched.ask(self.policy.act, loop.observation))
                     states.append(loop.now)
                 loop.end()

@@ -49,7 +49,7 @@ def _policy(path: Path, name: str, given: Any) -> Any:
         policy = as_policy(given)
     except SceneError as error:
         raise PolicyError(f"{path}: {error}") from None
-    if getattr(policy, "name", Policy.name) == Policy.name:
+    if getattr(policy, "name", Policy.name) in (Policy.name, "<lambda>"):
         with suppress(AttributeError):  # an object that takes no attributes keeps what it has
             policy.name = name
     return policy
@@ -66,9 +66,7 @@ def _imported(path: Path) -> Any:
     sys.path.insert(0, str(where.parent))
     try:
         spec.loader.exec_module(module)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # sys.exit in a module, for instance
+    except (Exception, SystemExit) as error:
         why = " ".join(named(error).split())[:300]
         raise PolicyError(f"{path} cannot be imported: {why}") from None
     finally:

@@ -32,7 +32,7 @@ from pytest_simbench.ground.host import host
 from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
 from pytest_simbench.records.notes import Notes
-from pytest_simbench.records.record import Failure, Record, Status
+from pytest_simbench.records.record import Failure, Record, RecordError, Status
 from pytest_simbench.scene import Scene
 from pytest_simbench.scene.policy import Kinematics
 from pytest_simbench.simulator import DescriptionError
@@ -147,7 +147,26 @@ class Repetition:
             "trace": self._write_trace(failed=error is not None),
             **self._end_film(failed=error is not None),
         }
-        return self._record(outcome, error, resources).noting(**noted), error
+        record = self._record(outcome, error, resources)
+        try:
+            record = self._checked(record) if error is None and self.number else record
+        except RecordError as wrong:
+            record, error = self._record(Outcome(), wrong, resources), wrong
+        return record.noting(**noted), error
+
+    def _checked(self, record: Record) -> Record:
+        """The record as a reader of its line has it, where a number that is none is None.
+
+        Raises:
+            RecordError: no reader takes it, or a metric cannot have its value.
+        """
+        task = self.experiment.task
+        found = Record.from_dict(record.to_dict(), f"the outcome of {task.name}")
+        for metric in task.metrics:
+            value = found.metrics.get(metric.name)
+            if value is not None and not metric.holds(value):
+                raise RecordError(f"{metric.name} of {task.name} cannot be {value:g}")
+        return found
 
     def _ended(self) -> tuple[Any, BaseException | None]:
         """What the task found, or what it raised; nothing interrupts from here on."""
@@ -187,6 +206,8 @@ class Repetition:
         if self._camera is not None:
             self._camera.enter(world, self.where.phase)
         outcome = self.experiment.task.perform(world, self.seed, self.hooks.count)
+        if not isinstance(outcome, Outcome):
+            raise TypeError(f"perform() returns an Outcome, not {type(outcome).__name__}")
         self._stats = world.stats()
         world.read_again()
         return outcome

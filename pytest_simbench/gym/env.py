@@ -62,10 +62,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         draws = Capability.OFFSCREEN in adapter(case.simulator).info.capabilities
         modes = ["rgb_array"] if draws else []
         self.metadata = {"render_modes": modes, "render_fps": rhythm.rate}
-        self.render_mode, self._looking = (
-            render_mode,
-            Looking(picture=PICTURE if render_mode else None),
-        )
+        self.render_mode = render_mode
+        self._looking = Looking(picture=PICTURE if render_mode else None)
         self.task, self.rhythm, self._actions, self._reward = task, rhythm, actions, reward
         self._jitter = Jitter(Jitter.distance * case.jitter, Jitter.angle * case.jitter)
         folder = TemporaryDirectory(prefix="simbench-gym-")  # for the worker's log

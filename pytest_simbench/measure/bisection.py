@@ -31,6 +31,11 @@ def first_worse(number: int, is_worse: Callable[[int], bool]) -> int:
     return bad
 
 
+def has_value(metric: Metric, result: ResultSet) -> bool:
+    """Whether a repetition has a value."""
+    return bool(result.crashed_by_seed() if metric is CRASHED else result.values(metric.name))
+
+
 def difference(metric: Metric, before: ResultSet, after: ResultSet) -> MeanDifference:
     """Whether the second is worse than the first, one-sided, paired by seed.
 
@@ -48,13 +53,13 @@ def difference(metric: Metric, before: ResultSet, after: ResultSet) -> MeanDiffe
 
 
 def like_the_bad_one(metric: Metric, good: ResultSet, bad: ResultSet, other: ResultSet) -> bool:
-    """Whether a release is nearer to the bad one than to the good one; so is one that
-    always crashes.
+    """Whether a release is nearer to the bad one than to the good one; so is one that has no value,
+    for instance since it always crashes.
 
     A test against the good one alone would call every release good that few repetitions cannot
     tell from it.
     """
-    if not (other.ok or metric is CRASHED):
+    if not has_value(metric, other):
         return True
     here = difference(metric, good, other).difference
     there = difference(metric, good, bad).difference

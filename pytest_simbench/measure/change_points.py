@@ -64,6 +64,13 @@ def change_points(values: Sequence[Mapping[int, float]], *, rows: int = 1) -> li
     ]
 
 
+def steps(values: Sequence[Mapping[int, float]]) -> list[ChangePoint]:
+    """Every change of a row of items that have one value each, which nothing leaves to chance."""
+    levels = [next(iter(found.values())) for found in values]
+    pairs = enumerate(pairwise(levels), start=1)
+    return [ChangePoint(place, *pair, 0.0) for place, pair in pairs if pair[0] != pair[1]]
+
+
 def _search(table: FloatArray, start: int, stop: int, rows: int, found: dict[int, float]) -> None:
     """Put the change points between two rows of the table into `found`, with their p values."""
     part = table[start:stop]

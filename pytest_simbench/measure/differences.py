@@ -109,8 +109,8 @@ def differences(
     A crashed repetition counts with the worst value where the metric has one (`Record.value`). Of
     other metrics the repetitions with a value are compared, and where the better side has none,
     that counts as the largest loss seen: nobody wins by those that survive. Pairs within the
-    metric's resolution are equal. A side whose values vary by no more than it is one value, many
-    times, and a mean difference within it is none.
+    metric's resolution are equal. A side whose values vary by no more than it, or that more
+    repetitions would not change (`Notes.sole`), is one value, and a mean difference within it none.
 
     Args:
         sides: records by side: simulator, mode, profile.
@@ -124,6 +124,7 @@ def differences(
     families: dict[Family, list[Metric]] = {"outcome": [CRASHED, *judged], "cost": costs}
     pairs = [pair for pair in combinations(sides, 2) if comparable(*pair)]
     ended = {key: [r for r in found if r.status != "interrupted"] for key, found in sides.items()}
+    sole = {key for key, found in ended.items() if any(r.notes.sole for r in found)}
     result: list[Difference] = []
     for family, of in families.items():
         tests = []
@@ -132,6 +133,8 @@ def differences(
             values = {key: _off(found, right) for key, found in _values(ended, metric).items()}
             known = metric if right is None else replace(metric, better="lower")
             tests += [_Pair(a, b, known, values[a], values[b]) for a, b in pairs]
+        for test in tests:
+            test.one_value |= not sole.isdisjoint((test.a, test.b))
         result += _judged(family, [test for test in tests if test.common])
     return result
 

@@ -71,6 +71,12 @@ class Change:
         return self.p_value <= ALPHA
 
     @property
+    def by_chance(self) -> bool:
+        """Whether so many repetitions can change as much by chance, and seldom: not one value that
+        all repetitions have, which is certain, and not so few that nothing is ever seldom."""
+        return 0 < _smallest_p(self.comparison) <= ALPHA
+
+    @property
     def repetitions(self) -> str:
         """How many were compared, in words."""
         first, second = self.comparison.n
@@ -183,12 +189,15 @@ def run_gate(
             (broken if typed else notes).append(f"{limit} compared nothing: {_told(reasons)}")
         else:
             apart = {test: why for test, why in reasons.items() if why != UNKNOWN}
-            notes += [f"{test}: {limit} is not tested: {why}" for test, why in apart.items()]
+            for test, why in apart.items():
+                lost = typed and why == LOST and after[test].ok
+                (broken if lost else notes).append(f"{test}: {limit} is not tested: {why}")
+    number = max(1, sum(change.by_chance for change in changes))
     notes += [
         f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
-        f"to be significant among {len(changes)} comparisons"
+        f"to be significant among {number} comparisons"
         for change in changes
-        if _smallest_p(change.comparison) * len(changes) > ALPHA * share
+        if _smallest_p(change.comparison) * number > ALPHA * share
     ]
     named = differences({test: (before[test].records, after[test].records) for test in common})
     return GateReport(
@@ -252,12 +261,12 @@ def _told(reasons: Mapping[str, str]) -> str:
 
 
 def _corrected(found: Iterable[Change | str], error: float = 1.0) -> tuple[Change, ...]:
-    """The changes that could be tested, with their p values corrected for their number, where they
-    have that share of the error."""
+    """The changes, with the p values of those that chance could bring corrected for their number,
+    where they have that share of the error."""
     changes = [change for change in found if isinstance(change, Change)]
-    p_values = holm([change.comparison.p_value for change in changes])
+    p_values = iter(holm([change.p_value for change in changes if change.by_chance]))
     return tuple(
-        replace(c, p_value=min(1.0, p / error)) for c, p in zip(changes, p_values, strict=True)
+        replace(c, p_value=min(1.0, next(p_values) / error)) if c.by_chance else c for c in changes
     )
 
 
@@ -293,7 +302,7 @@ def _rises(
 NO_MORE = Limit(CRASHED.name, 0.0, True)
 """What holds of crashes when nobody says anything: their share may not rise."""
 
-UNKNOWN = "it is not measured there"
+UNKNOWN, LOST = "it is not measured there", "no repetition of this run has a value"
 
 
 def _change(
@@ -301,7 +310,7 @@ def _change(
 ) -> Change | str:
     """The change of one metric, not yet corrected; else why there is none."""
     if not (limit.metric in old.known and limit.metric in new.known):
-        return UNKNOWN
+        return LOST if any(limit.metric in record.metrics for record in old.ok) else UNKNOWN
     metric = new.metric(limit.metric)
     if metric.better is None:
         return "neither direction of it is worse"
@@ -313,7 +322,7 @@ def _change(
     evened = without_speed(metric.name, old, new)
     first, second = evened or (old.by_seed(metric.name), new.by_seed(metric.name))
     if not first or not second:
-        return f"no repetition of {'this run' if first else 'the baseline'} has a value"
+        return LOST if first else "no repetition of the baseline has a value"
     worse: Alternative = "less" if metric.better == "higher" else "greater"
     sole = old.sole(metric.name) and new.sole(metric.name)
     comparison = compare_by_seed(first, second, "two-sided" if both_ways else worse, sole=sole)
@@ -337,5 +346,7 @@ def _smallest_p(comparison: MeanDifference) -> float:
     if comparison.sole:
         return 0.0
     first, second = comparison.n
+    if min(first, second) < 2:
+        return 1.0
     arrangements = 2**first if comparison.paired else math.comb(first + second, first)
     return 1 / min(arrangements, PERMUTATIONS + 1)

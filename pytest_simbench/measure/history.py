@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from pytest_simbench.ground.versions import BUILD, RELEASE, VersionedName, release_numbers
-from pytest_simbench.measure.change_points import ChangePoint, change_points
+from pytest_simbench.measure.change_points import ChangePoint, change_points, steps
 from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.measure.results import ResultSet
@@ -99,10 +99,11 @@ class TaskHistory(History):
             metric = course.metric
             for change in course.changes:
                 verb = "fell" if change.after < change.before else "rose"
+                p = change.p_value
                 found.append(
                     f"{metric.title} {verb} with {present[change.place]}: "
                     f"{metric.format(change.before)} -> {metric.format(change.after)}, "
-                    f"p = {change.p_value:.2g}"
+                    + (f"p = {p:.2g}" if p else "every repetition is the same")
                 )
         if not found:
             found.append("no change is supported by these repetitions")
@@ -146,7 +147,7 @@ def histories(
             variant = " ".join(filter(None, (key.mode, key.profile, key.parameters)))
             found.append(TaskHistory(key.simulator, task, key.function, variant, order, sets))
     number = sum(len(_courses(history)) for history in found)
-    return [replace(h, courses=tuple(_changed(c, number) for c in _courses(h))) for h in found]
+    return [replace(h, courses=tuple(_changed(c, number, h) for c in _courses(h))) for h in found]
 
 
 def _courses(history: TaskHistory) -> list[MetricCourse]:
@@ -170,9 +171,11 @@ def _values(name: str, results: Sequence[ResultSet], place: int) -> Mapping[int,
     return results[place].by_seed(name)
 
 
-def _changed(course: MetricCourse, rows: int) -> MetricCourse:
+def _changed(course: MetricCourse, rows: int, history: TaskHistory) -> MetricCourse:
     present = [values for values in course.values if values]
-    found = change_points(present, rows=rows)
+    sides = zip(history.results, course.values, strict=True)
+    sole = all(result.sole(course.metric.name) for result, values in sides if values)
+    found = steps(present) if sole else change_points(present, rows=rows)
     if course.metric.name in COSTS:
         found = [c for c in found if abs(c.after - c.before) > SMALLEST * abs(c.before)]
     return replace(course, changes=tuple(c for c in found if _matters(course.metric, c)))
@@ -289,7 +292,8 @@ class LawHistory(History):
 def law_histories(records: Iterable[Record]) -> list[LawHistory]:
     """The histories of laws in a run: of each simulator with two or more releases and builds."""
     versions = (r for r in records if VersionedName.of(r.simulator).kind)
-    every = by_release(r for r in versions if r.settings.get(PHENOMENON))
+    ended = (r for r in versions if r.status != "interrupted")
+    every = by_release(r for r in ended if r.settings.get(PHENOMENON))
     found = []
     for of, laws in grouped(every, lambda at: at[1]._replace(parameters="")).items():
         known = {label for law in laws for label in every[law]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from math import isfinite
+from math import inf, isfinite
 from typing import NoReturn
 
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
@@ -89,7 +89,8 @@ class ResultSet:
 
     def sole(self, name: str) -> bool:
         """Whether a metric has one value, which every repetition there could be would have."""
-        return name in self.metrics and all(record.notes.sole for record in self.records)
+        claimed = name in self.metrics and all(record.notes.sole for record in self.records)
+        return claimed and len({*self.values(name)}) == 1
 
     @property
     def crashed(self) -> tuple[Record, ...]:
@@ -148,8 +149,8 @@ class ResultSet:
         key = (name, confidence)
         if key not in self._intervals:
             found = interval(self.values(name), self.metric(name), confidence)
-            if found.method == "none" and found.n and self.sole(name):
-                found = replace(found, method="constant")
+            if self.sole(name):
+                found = replace(found, low=-inf, high=inf, method="constant")
             self._intervals[key] = found
         return self._intervals[key]
 
@@ -205,6 +206,8 @@ class ResultSet:
         self._assert_recorded()
         if self.crashed:
             self._refute("")
+        found = Judgement(Verdict.SUPPORTED, at_most(0.0), self._judged(CRASHED))
+        self.judged.append((CRASHED, found))
 
     def assert_crashed_at_most(self, share: float) -> None:
         """Fail when more than `share` (0..1) of all repetitions ever made would crash."""

@@ -168,6 +168,7 @@ class Transfer:
     Attributes:
         outcomes: (simulators, policies, seeds), 1 for success; at least `FEWEST` seeds.
         left_out: simulators that lack a policy.
+        lone: policies that too few simulators have.
     """
 
     task: str
@@ -175,6 +176,7 @@ class Transfer:
     simulators: Sequence[Who]
     outcomes: Array
     left_out: Sequence[Who] = ()
+    lone: Sequence[str] = ()
 
     @property
     def seeds(self) -> int:
@@ -283,8 +285,11 @@ def _transfer(records: Sequence[Record]) -> Transfer | None:
             name = str(r.settings[POLICY])
             name += f" {str(r.settings.get(DIGEST))[:6]}" if twice[name] > 1 else ""
             of.setdefault(name, {})[r.seed] = float(value)
-    policies = sorted({policy for of in found.values() for policy in of})
-    whole = [who for who, of in found.items() if len(of) == len(policies)]
+    have = {who: {p for p in of if len(of[p]) >= FEWEST} for who, of in found.items()}
+    sharing = [(own, [who for who in have if own <= have[who]]) for own in have.values()]
+    # The most that two simulators have.
+    own, whole = max(sharing, key=lambda of: (len(of[1]) > 1, *map(len, of)), default=(set(), []))
+    policies = sorted(own)
     every = [found[who][policy].keys() for who in whole for policy in policies]
     seeds = sorted(frozenset(every[0]).intersection(*every[1:])) if every else []
     if len(whole) < 2 or len(policies) < 2 or len(seeds) < FEWEST:
@@ -292,5 +297,6 @@ def _transfer(records: Sequence[Record]) -> Transfer | None:
     outcomes = np.array([[[found[w][p][s] for s in seeds] for p in policies] for w in whole])
     order = np.argsort(-outcomes.sum((0, 2)), kind="stable")
     left_out = [who for who in found if who not in whole]
+    lone = sorted({policy for of in found.values() for policy in of} - own)
     known = [policies[k] for k in order]
-    return Transfer(records[0].task, known, whole, outcomes[:, order], left_out)
+    return Transfer(records[0].task, known, whole, outcomes[:, order], left_out, lone)

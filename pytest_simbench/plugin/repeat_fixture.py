@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from math import isfinite
 from typing import Any
 
@@ -28,7 +30,7 @@ from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks.base import Task
 
@@ -74,7 +76,7 @@ class RepeatFixture:
         )
 
         def up_to(number: int) -> list[Record]:
-            with failing((*REFUSALS, LoopError)):
+            with failing((*REFUSALS, LoopError, RecordError)):
                 return repeater.up_to(number, found)
 
         metrics = experiment.task.metrics
@@ -107,11 +109,13 @@ class RepeatFixture:
 
     def finish(self, benchmark: Any) -> None:
         """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
+        alike = Counter[tuple[object, ...]]()
         for result in self.results:
             self.node.user_properties.extend(_properties(result))
             for metric, judgement in result.judged:
                 claim = claim_of(self.case, result, metric, judgement)
-                self.run.folder.claim(claim)
+                self.run.folder.claim(replace(claim, number=alike[claim.identity]))
+                alike[claim.identity] += 1
                 title = in_one_line(f"claim {metric.name} {judgement.claim}")
                 self.node.user_properties.append((title, claim.verdict))
         if self.results and benchmark is not None:

@@ -50,6 +50,7 @@ class Run:
         reading: what the folder holds once the run is `complete`; empty before.
         mistake: in what was typed, found when the tests had ended; one sentence.
         resumed: the interrupted run that this one completes, if it does.
+        failing: whether a test of the resumed run that did not run again had failed.
         page: to look at, once the whole report is written.
         expected: what later tests will ask for; set before the first one asks.
     """
@@ -63,6 +64,7 @@ class Run:
         self.displays = Displays()
         self.reading = RunContents()
         self.mistake = ""
+        self.failing = False
         self.page: Path | None = None
         self.expected: Callable[[], Iterable[Experiment]] = tuple
         self._attempts: Counter[tuple[str, str, str]] = Counter()
@@ -253,8 +255,11 @@ class Run:
         """Take over records that came with a report, from an xdist worker for instance."""
         self.folder.take_over(Record.from_json(line) for line in lines)
 
-    def judge(self, failed: Iterable[Mapping[str, Any]], passed: Collection[str]) -> None:
-        """Keep which tests failed as a whole; those of the resumed run that pass now do so no more.
+    def judge(
+        self, failed: Iterable[Mapping[str, Any]], passed: set[str], xfailed: Collection[str]
+    ) -> None:
+        """Keep which tests failed as a whole; those of the resumed run that pass now do so no more,
+        and what failed as expected is told as that.
 
         A run in which nothing was recorded keeps nothing.
         """
@@ -262,10 +267,15 @@ class Run:
             return
         for test in failed:
             self.folder.claim(Claim.from_dict(test))
-        before = self.folder.scan().claims if self.resumed else ()
-        for claim in {claim.identity: claim for claim in before if not claim.metric}.values():
-            if claim.verdict == "FAIL" and claim.test in passed:
-                self.folder.claim(replace(claim, verdict="PASS", advice=""))
+            passed.discard(test["test"])  # its teardown failed
+        found = self.folder.scan().claims if self.resumed or xfailed else ()
+        for claim in {claim.identity: claim for claim in found}.values():
+            if claim.verdict == "FAIL" and claim.test in xfailed:
+                self.folder.claim(replace(claim, verdict="XFAIL"))
+            elif claim.verdict == "FAIL" and not claim.metric:
+                self.failing |= claim.test not in passed
+                if claim.test in passed:
+                    self.folder.claim(replace(claim, verdict="PASS", advice=""))
 
     def complete(self) -> None:
         """Read what all processes wrote; called when all tests have ended."""
@@ -301,6 +311,7 @@ class Run:
             reporter.write_sep("=", title)
             reporter.write_line(text)
         baseline, report = found or ("", None)
+        passed = passed and not self.failing
         outcome = RunOutcome(passed, baseline, report, looks)
         problems.append(write_outcome(path, outcome))
         if badge := options.value(self.config, "sim_badge"):

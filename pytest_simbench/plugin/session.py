@@ -44,6 +44,7 @@ class SimSession:
         self._received: list[str] = []
         self._failed: list[dict[str, Any]] = []
         self._passed: set[str] = set()
+        self._xfailed: set[str] = set()
 
     @cached_property
     def selection(self) -> Selection:
@@ -218,6 +219,8 @@ class SimSession:
             self._failed.append(failed)
         if report.when == "call" and report.passed:
             self._passed.add(report.nodeid)
+        elif report.skipped and hasattr(report, "wasxfail"):
+            self._xfailed.add(report.nodeid)
 
     @contextmanager
     def _interruptible(self) -> Iterator[None]:
@@ -244,7 +247,7 @@ class SimSession:
             if self.in_worker:
                 return
             if self.begun:
-                self.run.judge(self._failed, self._passed)
+                self.run.judge(self._failed, self._passed, self._xfailed)
                 self.run.complete()
             if self.comparison is not None and self._alone:
                 from pytest_simbench.records.folder import RunContents

@@ -8,7 +8,8 @@ from typing import Literal
 from pytest_simbench.records.checked import Count, Name
 from pytest_simbench.records.description import FolderLine
 
-Verdict = Literal["PASS", "FAIL", "UNDECIDED"]
+Verdict = Literal["PASS", "FAIL", "UNDECIDED", "XFAIL"]
+"""What the repetitions say; XFAIL: it fails, and so its test was expected to."""
 
 Relation = Literal["at least", "at most"]
 
@@ -22,6 +23,7 @@ class Claim(FolderLine):
             empty where the test as a whole failed.
         metric, relation, threshold: what was claimed of which metric; empty where the test as a
             whole failed.
+        number: of claims of one test that are alike in task, metric and relation, from 0.
         verdict: what the repetitions say of it.
         mean, low, high: what was measured, and the bounds that decided; None where there are none.
         n, crashed: repetitions that were judged, and those of them that crashed.
@@ -45,8 +47,9 @@ class Claim(FolderLine):
     n: Count = 0
     crashed: Count = 0
     advice: str = ""
+    number: Count = 0
 
     @property
     def identity(self) -> tuple[object, ...]:
         """What tells it from other claims of a run."""
-        return self.test, self.task, self.metric, self.relation
+        return self.test, self.task, self.metric, self.relation, self.number

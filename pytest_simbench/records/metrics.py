@@ -93,6 +93,10 @@ class Metric:
         """Whether it lies in 0..1, so that a mean of it is a proportion."""
         return self.kind != "value"
 
+    def holds(self, value: float) -> bool:
+        """Whether it can have that value: a proportion in 0..1, others from their least."""
+        return 0 <= value <= 1 if self.bounded else self.least is None or value >= self.least
+
     @property
     def smallest_difference(self) -> float:
         """The smallest difference that means anything; 0 for proportions and counts."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pytest_simbench.ground.errors import PolicyError
-from pytest_simbench.scene.checks import SceneError, check_number
+from pytest_simbench.scene.checks import LARGEST, SceneError, check_number, check_pose
 from pytest_simbench.scene.policy import Command, Kinematics, LoopError, Observation
 from pytest_simbench.scene.pose import FloatArray, Pose, vector3
 from pytest_simbench.scene.robot import FREE, Robot
@@ -175,14 +175,21 @@ class SetPoints:
             tool = _changed(self._kinematics.tool_pose(self.position), change)
         if not isinstance(tool, Pose):
             raise PolicyError(f"the policy answers tool={tool!r:.60}, which is no Pose")
+        try:
+            check_pose(tool, "the tool")
+        except SceneError as error:
+            raise PolicyError(f"the policy answers a tool that cannot be: {error}") from None
         return self._kinematics.towards(self.position, tool, self._period)
 
     def _finger(self, width: float) -> float:
-        value = float(_numbers(width, "gripper").reshape(()))
+        value = _numbers(width, "gripper")
+        if value.size != 1:
+            raise PolicyError(f"the policy answers gripper of shape {value.shape}, not one number")
         if not len(self._fingers):
             raise PolicyError(f"the policy moves the gripper; robot {self._robot.name!r} has none")
         low, high = sorted((self._robot.gripper.closed, self._robot.gripper.opened))
-        wanted = value / 2 if self._kinematics is None else self._kinematics.finger(value)
+        width = value.item()
+        wanted = width / 2 if self._kinematics is None else self._kinematics.finger(width)
         return float(np.clip(wanted, low, high))
 
 
@@ -201,8 +208,11 @@ def _numbers(values: Any, what: str) -> FloatArray:
         found = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
         raise PolicyError(f"the policy answers {what}={values!r:.60}, which is no number") from None
-    if not np.isfinite(found).all():
-        raise PolicyError(f"the policy answers {what} with a number that is not finite: {found}")
+    if not (np.abs(found) <= LARGEST).all():
+        raise PolicyError(
+            f"the policy answers {what} with a number that is not finite, or above {LARGEST:g}: "
+            f"{found}"
+        )
     return found
 
 

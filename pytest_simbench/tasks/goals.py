@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import re
 from abc import abstractmethod
+from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from copy import copy
+from copy import copy, deepcopy
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from threading import Lock
+from types import MethodType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -23,9 +26,10 @@ from pytest_simbench.motion.model import grasping_scale_of, scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Robot, Scene
-from pytest_simbench.scene.policy import Function, Observation
+from pytest_simbench.scene.policy import Function, Observation, checked
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Randomness, Task, cube
 from pytest_simbench.tasks.pushing import BLOCK_MASS, BLOCK_SIZE, FRICTION, RED
+from pytest_simbench.worker.wire import pack
 
 HELD = 0.5
 """What is at its goal for so long [s] has come to stay."""
@@ -67,6 +71,9 @@ class GoalTask(Task):
     inside: bool = False
     settle: float = 0.5
     robot: Robot | None = None
+
+    def __post_init__(self) -> None:
+        checked(self.tolerance, "the tolerance [m] of a goal", above=True)
 
     @cached_property  # asked at each observation
     def arm(self) -> Robot:
@@ -126,7 +133,7 @@ class GoalTask(Task):
         world.mark("start")
         with world.phase("act"):
             world.control(
-                copy(self.policy),  # other repetitions may be under way
+                _copied(self.policy),  # other repetitions may be under way
                 until=self.seconds if self.inside else stayed,
                 at_most=self.seconds,
                 rate=self.rate,
@@ -253,6 +260,24 @@ def _drawn(seed: int, low: tuple[float, ...], high: tuple[float, ...]) -> Any:
     return Randomness.of(seed).order.uniform(low, high)
 
 
+KEPT = list, dict, set, deque, MethodType
+"""What a policy changes in place while it acts. A method changes what it is bound to."""
+
+
+def _copied(policy: Any) -> Any:
+    """With arrays, lists and dicts of its own; a network, or what cannot be copied, is shared, and
+    so are arrays of which one is a view of another."""
+    own = copy(policy)  # a function is not copied
+    held, known = {} if own is policy else getattr(own, "__dict__", {}), {id(policy): own}
+    arrays = [value for value in held.values() if isinstance(value, np.ndarray)]
+    linked = any(one.base is other for one in arrays for other in arrays)
+    for name, value in held.items():
+        if isinstance(value, KEPT if linked else (*KEPT, np.ndarray)):
+            with suppress(Exception):
+                held[name] = deepcopy(value, known)
+    return own
+
+
 def name_of(policy: Any) -> str:
     """Of a policy, for records."""
     named = getattr(policy, "name", None) or getattr(policy, "__name__", None)
@@ -267,11 +292,13 @@ _PARSING = Lock()
 def digest(policy: Any) -> str:
     """Of a policy's source and of the numbers and texts that it holds; others (the weights of a
     network, for instance) do not count."""
-    text = [name_of(policy)]
+    text, held = [name_of(policy)], {**getattr(policy, "__dict__", {})}
     made = policy._act if isinstance(policy, Function) else policy
+    with suppress(TypeError):
+        held |= inspect.getclosurevars(made).nonlocals
     with suppress(OSError, TypeError), _PARSING:
         text.append(inspect.getsource(made if inspect.isroutine(made) else type(made)))
-    for name, value in sorted(getattr(policy, "__dict__", {}).items()):
-        if isinstance(value, int | float | str | list | tuple | dict | np.ndarray):
-            text.append(f"{name}={value!r}")
+    for name, value in sorted(held.items()):
+        if isinstance(value, int | float | str | list | tuple | dict | np.ndarray | np.generic):
+            text.append(re.sub(" at 0x[0-9a-f]+", "", f"{name}={pack(value)!r}"))
     return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]

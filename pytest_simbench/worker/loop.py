@@ -9,6 +9,7 @@ import json
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -126,15 +127,23 @@ def inside(scene: Scene, told: Row, period: float, policy: Mapping[str, Any]) ->
     def answer(
         time: float, joints: FloatArray, told: Row, bodies: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
+        state = written(time, joints, told, bodies).tobytes()  # as outside: it cannot be written to
         try:
-            points.after(made(sight.seen(time, joints, told, bodies)))
+            points.after(made(sight.read(np.frombuffer(state))))
         except PolicyError:
             raise
-        except Exception as error:
-            raise PolicyError(f"the policy {policy['name']} raised {named(error)}") from error
+        except (Exception, SystemExit) as error:
+            raise PolicyError(f"the policy {policy['name']} {raised(error)}") from error
         return points.position, points.effort
 
     return answer
+
+
+def raised(error: BaseException) -> str:
+    """What a policy raised that was asked where `error` was caught, and in which line."""
+    line = error.__traceback__ and error.__traceback__.tb_next
+    at = f" ({Path(line.tb_frame.f_code.co_filename).name}:{line.tb_lineno})" if line else ""
+    return f"raised {named(error)}{at}"
 
 
 def _made(policy: Mapping[str, Any]) -> Callable[[Any], Any]:
@@ -150,7 +159,7 @@ def _made(policy: Mapping[str, Any]) -> Callable[[Any], Any]:
         made: Policy = object.__new__(found)
         vars(made).update(policy["state"])
         made.reset(policy["seed"])
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise PolicyError(
             f"the policy {policy['name']} cannot run inside the worker: {named(error)}; put it "
             "into a file of its own that imports numpy and what the worker has"

@@ -256,7 +256,7 @@ class Server:
             loop = Loop(every, most, late, stepper.told, period, answer)
             return self._moved(stepper.close_loop(loop, log_period))
         finally:
-            if self.exchange is not None:
+            if self.exchange is not None and inside is None:  # else nobody reads it
                 self.exchange.send(b"")  # no question: the answer comes
 
     def _exchange(self, question: bytes) -> bytes | None:
@@ -283,11 +283,13 @@ class Server:
         return {"log": log, **self.do_state()}
 
     def do_save(self, name: str) -> None:
-        self.saved[name] = self._constructed().save()
+        self.saved[name] = self._constructed().save(), self._loaded().told
 
     def do_restore(self, name: str) -> dict[str, Any]:
-        self._constructed().restore(self.saved[name])
+        kept, set_points = self.saved[name]
+        self._constructed().restore(kept)
         state, stepper = self.do_state(), self._loaded()
+        stepper.told = set_points
         if stepper.watch is not None:
             stepper.watch.restored(stepper.clocks.steps, state["joints"], state["bodies"])
         return state

@@ -15,6 +15,7 @@ from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
 from tests.records.build import record
+from tests.report.model.test_claims import claim
 
 
 def saved(folder: Path, seed: int, log: str, **changes: object) -> Record:
@@ -54,6 +55,18 @@ def test_logs_and_traces_are_copied_under_names_of_ours(here: Path) -> None:
     assert [(whole / t).read_text()[-4:] for t in traces] == ["of a", "of b"]
     videos = [Path(log.replace("logs", "videos")).with_suffix(".mp4") for log in logs]
     assert [(whole / v).read_text()[-4:] for v in videos] == ["of a", "of b"]
+
+
+def test_claims_of_parts_are_not_those_of_the_whole(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, seed in (("a", 1), ("b", 2)):
+        saved(here / name, seed, "")
+        RunFolder(here / name).claim(claim(verdict="FAIL"))
+    assert merge("a", "b") == 0
+    told = capsys.readouterr().out
+    assert told.startswith("no claim was judged; 0 of 2 repetitions crashed")
+    assert "pytest --sim-resume=whole judges the claims of the whole\n" in told
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -26,7 +27,7 @@ from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.scene.policy import Command, LoopError, Observation, Policy
 from pytest_simbench.tasks import Reaching
 from pytest_simbench.tasks.base import cube
-from tests.client.waving import Waving, still
+from tests.client.waving import Waving, still, writing
 
 SCENE = Scene("arm", (cube("a", Pose.at(0.5, 0.3, 0.025), (1.0,) * 4),), panda())
 Worlds = Callable[..., World]
@@ -108,6 +109,17 @@ def test_it_ends_when_it_shall(world: Worlds) -> None:
     assert one.time == pytest.approx(0.1)
     one.control(still, until=lambda seen: False, at_most=0.1)
     assert one.time == pytest.approx(0.2)
+    one.control(still, until=lambda seen: seen.time >= 0.3 - 1e-9, observation_delay=0.04)
+    assert one.time == pytest.approx(0.3)  # what is seen late does not end late
+
+
+def test_from_a_kept_state_it_acts_as_it_did_there(world: Worlds) -> None:
+    one, ways = world(), []
+    one.save()
+    for _ in range(2):
+        ways.append(one.control(Waving(0.3), until=0.5).joints)
+        one.restore()
+    np.testing.assert_array_equal(*ways)
 
 
 def test_forces_and_pictures_are_shown_where_they_are_asked_for(world: Worlds) -> None:
@@ -144,6 +156,8 @@ class Failing(Policy):
             return None
         if self.how == "stalls":
             time.sleep(30.0)
+        if self.how == "exits":
+            sys.exit(3)
         if self.how == "raises":
             raise RuntimeError("the network is away")
         return np.full(7, np.nan)
@@ -156,6 +170,7 @@ class Failing(Policy):
             "raises",
             r"policy failing raised RuntimeError: the network is away \(test_closed_loop.py",
         ),
+        ("exits", "policy failing raised SystemExit: 3"),
         ("answers NaN", "the policy answers position with a number that is not finite"),
         ("stalls", "policy failing gave no answer for 2 s"),
     ],
@@ -169,9 +184,20 @@ def test_one_that_fails_is_told_in_its_own_words(world: Worlds, how: str, told: 
         assert one.process.request("state")["time"] == pytest.approx(0.16, abs=0.021)
 
 
-def test_inside_too(world: Worlds) -> None:
-    with pytest.raises(PolicyFailed, match="raised ValueError: too far"):
-        world().control(Waving(9.0), until=1.0, inside=True)
+def test_inside_too_and_nothing_of_it_delays_the_next(
+    world: Worlds, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pytest_simbench.client.process.LOOK_PERIOD", 60.0)
+    one = world(stall_timeout=5.0)
+    with pytest.raises(PolicyFailed, match=r"raised SystemExit: too far \(waving.py:2"):
+        one.control(Waving(9.0), until=1.0, inside=True)
+    one.control(still, until=0.1)
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_what_it_sees_is_not_for_writing(world: Worlds, inside: bool) -> None:
+    with pytest.raises(PolicyFailed, match="read-only"):
+        world().control(writing, until=0.1, inside=inside)
 
 
 def test_a_repetition_fails_alone(case: Case) -> None:
@@ -225,6 +251,14 @@ def test_what_cannot_run_inside(world: Worlds, policy: Any, told: str) -> None:
     one = world()
     with pytest.raises(PolicyFailed, match=told):
         one.control(policy, until=0.1, inside=True)
+
+
+def test_a_script_does_not_start_itself_again(
+    world: Worlds, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(still, "__module__", "__main__")
+    with pytest.raises(PolicyFailed, match="would run again inside the worker"):
+        world().control(still, until=0.1, inside=True)
 
 
 def test_what_does_not_travel(world: Worlds) -> None:

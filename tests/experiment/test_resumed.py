@@ -235,6 +235,20 @@ def test_on_the_command_line(pytester: pytest.Pytester) -> None:
     assert "judged 3 times" in (pytester.path / "o" / "report.md").read_text()
 
 
+def test_a_run_is_failing_until_what_failed_runs_again(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(TEST + TEST.replace("falling(", "broken(") + "        assert 0\n")
+    for more, passed in (
+        (["--sim-output=o"], False),
+        (["--sim-resume=o", "-k", "falling"], False),
+        (["--sim-resume=o"], True),
+    ):
+        result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=1", *more)
+        assert json.loads((pytester.path / "o/outcome.json").read_text())["passed"] is passed
+        result.stdout.fnmatch_lines(["test_broken: the test passes *FAIL*"] * (not passed))
+        if "-k" in more:
+            pytester.makepyfile(TEST + TEST.replace("falling(", "broken("))
+
+
 def test_a_newer_schema_is_one_sentence(case: Case, save: Save) -> None:
     folder = save(*ended(case, Falling(), 1)).folder
     path = folder.path / "records.jsonl"

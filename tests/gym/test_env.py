@@ -236,6 +236,7 @@ def test_several_at_once_are_as_one_after_the_other() -> None:
         ({"rate": 30.1}, "asked every 33.22 ms, which is no multiple of the time step"),
         ({"rate": 0}, "the rate"),
         ({"seconds": 0}, "the seconds of an episode"),
+        ({"tolerance": float("nan")}, "the tolerance"),
         ({"reward": "much"}, "reward='much': choose from dense, sparse"),
         ({"actions": None}, "actions=None: choose from joints, tool"),
         ({"render_mode": "human"}, "render_mode='human': choose from None, rgb_array"),

@@ -184,6 +184,10 @@ def test_what_cannot_vary_is_not_told_apart() -> None:
     same = {name: list(at + 1e-6 * rng.random(20)) for name, at in (("a", 0.013), ("b", 0.025))}
     spread = list(0.04 + 0.004 * rng.random(20))
     assert wins(planted({**same, "c": spread}, "landing_error")) == set()
+    alone = {
+        k: [replace(r[0].noting(sole=True), seed=1)] for k, r in planted(same, "placed").items()
+    }
+    assert one(alone, "placed").needs == 0  # no further repetition would be another one
     wide = {"a": list(0.013 + 0.004 * rng.random(20)), "c": spread}
     assert wins(planted(wide, "landing_error")) == {("a", "c", "landing_error")}
 

@@ -184,6 +184,22 @@ def test_a_limit_that_compares_nothing_fails_and_says_why() -> None:
     assert run_gate(here, [], (), {}, typed=False).failures == ()
 
 
+def test_a_value_that_one_test_has_lost_fails_a_typed_limit() -> None:
+    """The limit is compared in another test: the run passed, with a note."""
+    values = {"placed": 1.0, "landing_error": 0.1}
+    here = [record(k, metrics=values) for k in range(6)]
+    other = [replace(r, test="test_other[engine-headless]", function="test_other") for r in here]
+    lost = [replace(r, metrics={"placed": 1.0}) for r in other]
+    limits = parse_limits("landing_error:1", METRICS)
+    for typed in (True, False):
+        sides = [*here, *other], [*here, *lost]
+        report = run_gate(*sides, limits, {"stacking": METRICS}, typed=typed)
+        told = "test_other[engine-headless]: landing_error:1 is not tested: no repetition of this "
+        assert [t for t in report.failures if t.startswith(told)] == [*report.failures]
+        assert bool(report.failures) is typed
+        assert any(t.startswith(told) for t in (*report.failures, *report.notes))
+
+
 def test_seeds_pair_where_they_can() -> None:
     rng = np.random.default_rng(22)
     before = np.round(rng.uniform(0.3, 0.9, 20), 3)
@@ -276,6 +292,20 @@ def test_one_comparison_more_makes_each_less_sure() -> None:
     assert both.p_value == pytest.approx(2 / 2**8)
 
 
+def test_what_is_certain_and_what_nothing_can_show_make_nothing_less_sure() -> None:
+    """82 laws, each asked once, hid what a task beside them had lost."""
+    laws = [
+        record(1, test=f"test_law[{k}]", metrics={"placed": 1.0}).noting(sole=bool(k % 2))
+        for k in range(82)
+    ]
+    before, after = made([1.0] * 8), made([0.8] * 8)
+    alone = run(before, after, "placed:5%").changes[0]
+    (found,) = (
+        c for c in run([*laws, *before], [*laws, *after], "placed:5%").changes if c.exceeded
+    )
+    assert (found.test, found.p_value) == (alone.test, alone.p_value)
+
+
 def test_how_few_are_too_few() -> None:
     """The smallest p value of n pairs is 1 / 2^n, of n and m others 1 / (n + m over n)."""
 
@@ -286,6 +316,7 @@ def test_how_few_are_too_few() -> None:
     assert notes(5, 5) == ()
     assert "3 and 2 repetitions are too few" in notes(3, 2, seed=500)[0]
     assert notes(3, 3, seed=500) == ()  # 1 of 20 is 0.05
+    assert "20 and 1 repetitions are too few" in notes(20, 1)[0]  # one is told from no chance
     two = "placed:5%,ram:10%"
     assert notes(5, 5, two) == tuple(
         f"test_stacking[engine-headless]: 5 pairs are too few for a change of {name} to be "

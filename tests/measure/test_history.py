@@ -72,6 +72,17 @@ def test_a_release_that_fails_is_named_with_its_message() -> None:
     )
 
 
+def test_the_one_value_that_all_repetitions_would_have_changes_for_certain() -> None:
+    levels = (("1", 1.0), ("2", 1.0), ("3", 0.6), ("4", 0.6))
+    found = [
+        r.noting(sole=True) for version, placed in levels for r in release(version, placed, n=1)
+    ]
+    (history,) = histories(found, {"stacking": METRICS})
+    assert history.sentences() == [
+        "placed fell with 3: 100 % -> 60 %, every repetition is the same"
+    ]
+
+
 def test_two_releases_and_other_names_are_no_history() -> None:
     builds = [replace(r, simulator=f"engine@{k}") for k in range(3) for r in release("1", 1.0)]
     assert histories([*release("1", 1.0), *release("2", 1.0)], {"stacking": METRICS}) == []
@@ -148,3 +159,14 @@ def test_a_release_is_worse_by_one_value_that_all_repetitions_would_have() -> No
     kept = [record(1, metrics={"placed": placed}).noting(sole=True) for placed in (1.0, 0.9)]
     sides = (ResultSet([each], METRICS) for each in kept)
     assert bisection.difference(PLACED, *sides).p_value == 0.0
+
+
+def test_values_that_differ_are_not_one_whatever_the_simulator_claims() -> None:
+    before, after = (
+        [record(k, metrics={"placed": value}).noting(sole=True) for k, value in enumerate(values)]
+        for values in ((1.0, 1.0), (1.0, 0.8))
+    )
+    assert ResultSet(before, METRICS).sole("placed")
+    assert not ResultSet(after, METRICS).sole("placed")
+    limits = parse_limits("placed:5%", METRICS)
+    assert run_gate(before, after, limits, {"stacking": METRICS}).failures == ()

@@ -97,6 +97,10 @@ def twice(*last: float) -> list[Record]:
         # A law that a release was not asked counts for nothing.
         ([*row("fall", 0.1, 0.1, 0.1, 0.1), *asked("glide", "1.2", 0.5), *asked("glide", "2.0", 5)],
          "2.0: glide is broken (0.5x -> 5x)"),
+        # Nor does one that the user ended.
+        ([*row("glide", 0.5, 0.5, 0.5, 0.5)[:3],
+          *(replace(r, status="interrupted") for r in asked("glide", "2.0", None))],
+         "no release changed a law"),
     ],
 )  # fmt: skip
 def test_what_is_a_change(found: list[Record], told: str) -> None:

@@ -239,6 +239,16 @@ def test_fewer_than_five_repetitions_are_not_judged(n: int, value: float) -> Non
             check()
 
 
+@pytest.mark.parametrize("name", ["placed", "hit", "landing_error"])
+def test_the_one_value_that_all_repetitions_would_have_is_judged_as_it_is(name: str) -> None:
+    """A share and a yes or no were not judged, and no number of repetitions could change it."""
+    result = ResultSet([record(1, metrics={name: 1.0}).noting(sole=True)], METRICS)
+    result.strict = True
+    result.assert_at_least(name, 0.9)
+    with pytest.raises(AssertionError, match="the same in all repetitions, 1 repetition"):
+        result.assert_at_most(name, 0.9)
+
+
 def test_strict_fails_what_is_not_decided() -> None:
     for made, reason in ((placed(*[1.0] * 20), "inconclusive"), (placed(1.0), "not judged")):
         made.strict = True
@@ -323,3 +333,7 @@ def test_every_cause_is_a_failure(cause: str) -> None:
     assert result.crash_interval().mean == 0.25
     with pytest.raises(AssertionError, match=f"1 of 4 repetitions crashed: 1 x {cause} in settle"):
         result.assert_no_crashes()
+    fine = placed(1.0, 1.0)
+    fine.assert_no_crashes()
+    verdicts = [judged.verdict for of in (result, fine) for _, judged in of.judged]
+    assert verdicts == ["refuted", "supported"]  # that it held was not told

@@ -200,6 +200,17 @@ def test_records_are_paired_by_seed_and_a_crash_is_no_success() -> None:
     assert found.mmrv(0, 1).mean == float(mmrv(*found.outcomes.mean(-1)))
 
 
+def test_what_has_no_like_is_left_out_and_the_others_are_compared() -> None:
+    """A policy that one simulator has, and a simulator that was interrupted after two seeds."""
+    new = [tried("a", "new", seed, True) for seed in range(1, 13)]
+    short = [tried("d", policy, seed, True) for policy in ("good", "bad") for seed in (1, 2)]
+    (found,) = transfers([*whole(), *new, *short])
+    assert (found.policies, found.lone, found.seeds) == (["good", "bad"], ["new"], 11)
+    assert [[who[0] for who in some] for some in (found.simulators, found.left_out)] == [
+        ["a", "b"], ["d"]
+    ]  # fmt: skip
+
+
 def test_other_work_is_no_transfer() -> None:
     two = transfers([*whole(), *whole(**{"task.seconds": 3})])
     assert [found.seeds for found in two] == [11, 11]

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command import simbench
+from tests.plugin.inner import records
 
 PACKAGE = '''
     """Pours seven drops: what only this package says of its numbers."""
@@ -192,3 +193,34 @@ def test_a_run_of_before_is_shown_with_a_note(pytester: pytest.Pytester, package
     package.unlink()
     simbench(pytester, "merge", "a", "--output=whole")
     assert "does not say what its metrics mean" in Path("whole/report.md").read_text()
+
+
+GIVEN = """
+    import pytest
+    from pytest_simbench.tasks.base import Outcome
+    from pouring import Pouring
+
+    GIVEN = {
+        "nan": Outcome({"spill": float("nan")}), "share": Outcome({"caught": 1.5}),
+        "text": Outcome({"spill": "7"}), "nothing": None,
+    }
+
+    @pytest.mark.parametrize("given", GIVEN)
+    def test_giving(repeat, given):
+        repeat(type("Giving", (Pouring,), {"perform": lambda *_: GIVEN[given]})())
+"""
+
+
+@pytest.mark.usefixtures("package")
+def test_an_outcome_that_no_record_can_hold_fails_its_test_and_no_other(
+    pytester: pytest.Pytester,
+) -> None:
+    pytester.makepyfile(test_it=GIVEN)
+    result = run(pytester, "--reps=1", "--sim-output=a", ret=1)
+    result.assert_outcomes(passed=1, failed=3, warnings=result.parseoutcomes().get("warnings", 0))
+    result.stdout.fnmatch_lines(
+        ["FAIL mujoco, test_giving share: Failed: caught of pouring cannot be 1.5",
+         "FAIL mujoco, test_giving text: *expected 'bool | float | None', got 'str'",
+         "FAIL mujoco, test_giving nothing: *perform() returns an Outcome, not NoneType"]
+    )  # fmt: skip
+    assert [r["metrics"] for r in records("a")] == [{"spill": None}, {}, {}, {}]

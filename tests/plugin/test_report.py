@@ -48,7 +48,7 @@ def test_a_run_ends_with_its_page_and_the_answer(pytester: pytest.Pytester) -> N
     lines = result.stdout.lines
     start = next(k for k, line in enumerate(lines) if "simulator comparison" in line)
     end = next(k for k, line in enumerate(lines) if line.startswith("report: "))
-    assert lines[start + 1] == "no claim was made; 0 of 5 repetitions crashed"
+    assert lines[start + 1] == "no claim was judged; 0 of 5 repetitions crashed"
     assert "mujoco did falling: 5 repetitions, none crashed." in lines
     assert lines[end] == "report: o/report.html"
     assert re.match(r"=+ .*1 passed", lines[end + 1])

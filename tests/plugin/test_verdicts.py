@@ -68,6 +68,9 @@ def test_a_test_fails_when_more_repetitions_crashed_than_may(
         warnings=result.parseoutcomes().get("warnings", 0),
     )  # fmt: skip
     result.stdout.fnmatch_lines([told])
+    result.stdout.fnmatch_lines(
+        ["* known to fail; *", "test_known: crashed <= 0 % *XFAIL*"] * known
+    )
     for name in failed:
         result.stdout.fnmatch_lines([f"FAILED *::test_{name}[[]mujoco-headless]*"])
     assert "Traceback" not in result.stdout.str()
@@ -152,3 +155,24 @@ def test_it_repeats_until_the_claims_are_decided(pytester: pytest.Pytester) -> N
         ".//property[@name='repetitions']"
     )
     assert [item.get("value") for item in found] == ["10", "12", "10"]
+
+
+ALIKE = """
+    from tests.tiny import Falling
+
+    def test_falling(repeat):
+        for least in (0.9, 0.1):
+            repeat(Falling(0.5 + least / 10)).assert_at_least("landed", least)
+"""
+
+
+def test_each_of_several_claims_that_are_alike_is_told(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(ALIKE)
+    for more in (["--sim-output=a"], ["--sim-resume=a"]):
+        result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=5", *more)
+        result.assert_outcomes(passed=1)
+        result.stdout.fnmatch_lines(
+            ["UNDECIDED   1 of 2 claims hold, 1 undecided; 0 of 10 repetitions crashed",
+             "test_falling: landed >= 90 %  UNDECIDED 100 *",
+             "test_falling: landed >= 10 %  PASS 100 *"]
+        )  # fmt: skip

@@ -59,7 +59,9 @@ def records(name: str, values: Sequence[float], **changes: Any) -> list[Record]:
     return [record(k, metrics={name: float(value)}, **changes) for k, value in enumerate(values)]
 
 
-def failed(repetition: int, cause: str = "WorkerHung", phase: str = "settle") -> Record:
+def failed(
+    repetition: int, cause: str = "WorkerHung", phase: str = "settle", **changes: Any
+) -> Record:
     """A record of a repetition that failed."""
     error = Failure(cause, "no answer for 30 s", phase, "last line")
-    return record(repetition, status="failed", error=error)
+    return record(repetition, status="failed", error=error, **changes)

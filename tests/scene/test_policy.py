@@ -140,6 +140,11 @@ def test_out_of_reach_the_joints_stay_within_their_limits() -> None:
         (np.zeros(8), r"answers position of shape \(8,\); the arm has 7 joints, and 9 with its"),
         ("left", "answers position='left', which is no number"),
         (np.full(7, np.nan), "position with a number that is not finite"),
+        (Command(velocity=np.full(7, 1e300)), "velocity with a number that is not finite, or"),
+        (Command(tool_change=[1e300] * 6), "tool_change with a number that is not finite"),
+        (Command(tool=Pose((math.nan, 0.0, 0.0))), "the position of the tool is nan; it must be"),
+        (Command(tool=Pose(quaternion=(1.0, 1.0, 0.0, 0.0))), "quaternion of the tool has the len"),
+        (Command(gripper=[0.01, 0.02]), r"gripper of shape \(2,\), not one number"),  # type: ignore[arg-type]
         (Command(position=START[:7], velocity=START[:7]), "commands position and velocity at once"),
         (Command(tool=(1, 2, 3)), "which is no Pose"),  # type: ignore[arg-type]
         (Command(tool_change=(1, 2, 3)), r"a tool_change of shape \(3,\), not \(6,\)"),

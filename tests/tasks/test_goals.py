@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,10 +76,21 @@ def test_a_record_tells_which_policy_it_was() -> None:
     class Held:
         gain = 1.0
 
-        def __init__(self, gain: float) -> None:
+        def __init__(self, gain: Any) -> None:
             self.gain = gain
 
-    assert digest(Held(1.0)) == digest(Held(1.0)) != digest(Held(2.0))
+    large = np.zeros(2000)
+    for one, other in (
+        (1.0, 2.0), ([1], (2,)), (np.float32(1), np.float32(2)), ([large], [large + 1e-12]),
+    ):  # fmt: skip
+        assert digest(Held(one)) == digest(Held(one)) != digest(Held(other))
+    kept = [Held(1.0), Held(1.0)]  # each stands somewhere else in memory
+    assert digest(Held(kept[:1])) == digest(Held(kept[1:]))
+
+    def closed(gain: float) -> Callable[[Observation], float]:
+        return lambda seen: gain
+
+    assert digest(closed(1.0)) == digest(closed(1.0)) != digest(closed(2.0))
 
 
 @pytest.mark.engine
@@ -108,3 +121,27 @@ def test_the_motion_is_kept_for_the_replay(case: Case) -> None:
     times = np.load(trace)["time"]
     assert times.size >= 75
     assert (np.diff(times) > 0).all()
+
+
+@pytest.mark.engine
+def test_what_a_policy_gathers_in_one_repetition_is_not_in_the_next(case: Case) -> None:
+    class Gathering:
+        def __init__(self) -> None:
+            self.rows, self.sum = [0.0], np.zeros(1)
+            self.same, self.way, self.ways = self.rows, self.gather, [self.gather]
+            self.count = 1
+
+        def act(self, seen: Observation) -> None:
+            self.way(seen.time)
+            self.ways[0](seen.time)
+            assert len(self.same) == len(self.rows) == self.count
+
+        def gather(self, time: float) -> None:
+            self.rows.append(time)
+            self.sum += len(self.rows)
+            self.count += 1
+
+    policy = Gathering()
+    record = performed(case, Reaching(policy, seconds=0.2, rate=10.0))
+    assert [*policy.rows, *policy.sum] == [0.0, 0.0]
+    assert record.settings["task.policy_digest"] == digest(Gathering())

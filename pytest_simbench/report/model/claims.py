@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
@@ -20,12 +20,12 @@ from pytest_simbench.report.model.document import Column, Table, names
 MOST = 12
 """Claims that fail, or are not decided, which the first screen tells in full."""
 
-ORDER = ("FAIL", "UNDECIDED", "PASS")
+ORDER = ("FAIL", "UNDECIDED", "PASS", "XFAIL")
 
 Metrics = Mapping[str, Sequence[Metric]]
 """What each task declares."""
 
-NO_CLAIM = "no claim was made"
+NO_CLAIM = "no claim was judged"
 
 
 @dataclass(frozen=True)
@@ -93,13 +93,14 @@ class _Told:
 
 def claims_of(reading: RunContents, comparison: GateReport | None = None) -> Claims:
     """Of a run, with the limits against its baseline."""
-    claims = _that_count(reading.claims)
+    of_test = grouped(reading.records, lambda r: r.test)
+    crashed = {test for test, of in of_test.items() if any(r.status == "failed" for r in of)}
+    claims = _that_count(reading.claims, crashed)
     told = [_told(claim, claims, reading.metrics) for claim in claims]
     failures = comparison.failures if comparison else ()
     count = Counter[str](claim.verdict for claim in claims)
     count["FAIL"] += len(failures)
     state = next((verdict for verdict in ORDER if count[verdict]), "")
-    of_test = grouped(reading.records, lambda r: r.test)
     fails = [one for one in told if one.claim.verdict == "FAIL"]
     undecided = [one for one in told if one.claim.verdict == "UNDECIDED"]
     troubles = [Trouble(text) for text in failures]
@@ -127,9 +128,15 @@ def _name(claim: Claim) -> str:
     return f"{_function(claim)} {claim.variant}".rstrip()
 
 
-def _that_count(found: Sequence[Claim]) -> list[Claim]:
-    """The last of each; of a test as a whole, only that it failed and no claim of it says why."""
-    last = {claim.identity: claim for claim in found}.values()
+def _that_count(found: Sequence[Claim], crashed: Collection[str]) -> list[Claim]:
+    """The last of each; of a test as a whole, only that it failed and no claim of it says why. What
+    an earlier attempt of a test said of crashes counts no more where its last one has none."""
+    every = {claim.identity: claim for claim in found}.values()
+    last = [
+        claim
+        for claim in every
+        if (claim.metric, claim.verdict) != (CRASHED.name, "FAIL") or claim.test in crashed
+    ]
     failed = {claim.test for claim in last if claim.metric and claim.verdict == "FAIL"}
     return [
         claim
@@ -153,6 +160,8 @@ def _sentence(state: str, count: Counter[str], records: Sequence[Record]) -> str
         parts = [f"{count['PASS']} of {total} claims hold"]
     if count["UNDECIDED"]:
         parts.append(f"{count['UNDECIDED']} undecided")
+    if count["XFAIL"]:
+        parts.append(f"{count['XFAIL']} known to fail")
     return f"{state}   {', '.join(parts)}; {repetitions}"
 
 

@@ -99,8 +99,10 @@ def _changes(data: Any) -> list[dict[str, Any]]:
 
 
 def looks_at(folder: Path, before: Iterable[Record], now: Iterable[Record]) -> int:
-    """How often a run has been judged, with this time: one that ended and to which repetitions were
-    added was looked at before."""
-    counts = [sum(r.status != "interrupted" for r in records) for records in (before, now)]
-    again = (folder / NAME).exists() and 0 < counts[0] < counts[1]
-    return RunOutcome.read(folder)[0].looks + again
+    """How often a run has been judged, with this time: one that ended and to one of whose tests
+    repetitions were added was looked at before. Tests that are new, of a further release for
+    instance, are looked at for the first time."""
+    ended = ([r for r in records if r.status != "interrupted"] for records in (before, now))
+    old, new = ({(r.test, r.repetition) for r in records} for records in ended)
+    more = {test for test, _ in new - old} & {test for test, _ in old}
+    return RunOutcome.read(folder)[0].looks + bool(more and (folder / NAME).exists())

@@ -50,18 +50,12 @@ def spread(values: Iterable[float | None], metric: Metric | None = None) -> Spre
         return None
     low: float | None = None
     high: float | None = None
-    if metric is not None and _possible(found, metric):
+    if metric is not None and all(map(metric.holds, found)):
         told = interval(found, metric)
         if math.isfinite(told.low) and math.isfinite(told.high):
             low, high = told.low, told.high
     std = statistics.stdev(found) if len(found) > 1 else 0.0
     return Spread(len(found), min(found), statistics.fmean(found), max(found), std, low, high)
-
-
-def _possible(values: Sequence[float], metric: Metric) -> bool:
-    if metric.bounded:
-        return min(values) >= 0 and max(values) <= 1
-    return metric.least is None or min(values) >= metric.least
 
 
 def pooled(resources: Iterable[Mapping[str, Any]], cost: str) -> Spread | None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 from pytest_simbench.measure.differences import Difference, differences
 from pytest_simbench.measure.modes import compare_modes
+from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
 from pytest_simbench.records.record import Failure, Record
@@ -230,7 +231,7 @@ def _undeclared(records: Sequence[Record]) -> list[Metric]:
 
 
 def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row:
-    first = records[0]
+    first, results = records[0], ResultSet(records, metrics)
     done = [record for record in records if record.status == "ok"]
     notes = list(dict.fromkeys(r.notes.untested for r in records if r.notes.untested))
     again = published_again((r.task, r.seed, r.notes.sample, r.notes.chosen_on) for r in done)
@@ -250,7 +251,10 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row
         finished=len(done),
         failed=sum(record.status == "failed" for record in records),
         interrupted=sum(record.status == "interrupted" for record in records),
-        metrics={m.name: spread([r.value(m) for r in records], m) for m in metrics},
+        metrics={
+            m.name: spread([r.value(m) for r in records], None if results.sole(m.name) else m)
+            for m in metrics
+        },
         costs={
             name: pooled([r.resources for r in done], name)
             if name in SAMPLED

@@ -34,8 +34,11 @@ SUCCESS = Metric(METRIC, METRIC, kind="yes_no")
 
 def section(found: Transfer) -> Section:
     """Who ranks alike; success, tau-b, and MMRV."""
-    left = listed(names(found.left_out))
-    notes = [f"not compared, since a policy is missing there: {left}"] if left else []
+    left = {
+        "a policy is missing there": listed(names(found.left_out)),
+        "too few simulators have it": listed(found.lone),
+    }
+    notes = [f"not compared, since {why}: {who}" for why, who in left.items() if who]
     shown = [
         Table("success of policies", _success(found), f"{found.seeds} seeds, the same everywhere."),
         Table("tau-b between simulators", _ranks(found), READING),

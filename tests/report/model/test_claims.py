@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -60,7 +61,7 @@ def reading(*claims: Claim, records: Any = RECORDS) -> RunContents:
 def test_the_first_line_says_pass_or_fail_and_how_many_crashed() -> None:
     undecided = claim("sapien", "UNDECIDED", advice="about 9 more repetitions needed")
     for claims, sentence in (
-        ((), "no claim was made; 0 of 4 repetitions crashed"),
+        ((), "no claim was judged; 0 of 4 repetitions crashed"),
         ((claim(),), "PASS   1 of 1 claims hold; 0 of 4 repetitions crashed"),
         ((claim(), undecided), "UNDECIDED   1 of 2 claims hold, 1 undecided; 0 of 4 repetitions"),
         ((claim(), undecided, FAILED), "FAIL   1 of 3 claims fail, 1 undecided; 0 of 4"),
@@ -100,6 +101,15 @@ def test_a_crash_is_worse_than_any_value() -> None:
 
 def test_of_a_claim_that_was_made_again_the_last_verdict_holds() -> None:
     assert claims_of(reading(FAILED, claim("drake"))).state == "PASS"
+
+
+def test_crashes_of_an_earlier_attempt_count_no_more() -> None:
+    """A plugin ran the test again, and nothing crashed: the run passes, and the page said FAIL."""
+    first = claim(metric="crashed", relation="at most", threshold=0.0, verdict="FAIL", mean=0.5)
+    assert claims_of(reading(first, claim())).sentence.startswith("PASS   1 of 1 claims hold")
+    assert claims_of(reading(replace(first, verdict="UNDECIDED"), claim())).state == "UNDECIDED"
+    crashed = (*RECORDS, stacked("mujoco", 3, None))
+    assert claims_of(reading(first, claim(), records=crashed)).state == "FAIL"
 
 
 def test_a_test_that_failed_as_a_whole_is_told_unless_a_claim_of_it_says_why() -> None:

@@ -84,8 +84,10 @@ def test_failed_repetitions_count_and_interrupted_ones_are_left_out() -> None:
     assert died.repetitions == [6]
 
 
-def test_intervals_are_those_the_assertions_use() -> None:
-    records = [r for r in stacking_run() if r.simulator == "mujoco"]
+@pytest.mark.parametrize("sole", [False, True])
+def test_intervals_are_those_the_assertions_use(sole: bool) -> None:
+    records = [r.noting(sole=sole) for r in stacking_run() if r.simulator == "mujoco"]
+    records = [next(r for r in records if r.ok)] if sole else records
     row, results = only(*records), ResultSet(records, STACKING)
     for metric in STACKING:
         found, expected = row.metrics[metric.name], results.interval(metric.name)

@@ -86,8 +86,11 @@ def test_what_cannot_be_told_says_how_many_seeds_it_needs() -> None:
 
 
 def test_who_lacks_a_policy_is_named() -> None:
-    told = section(report(run(a=POLICIES, b=POLICIES, e={"limp": 1})).transfers[0])
-    assert told.notes == ["not compared, since a policy is missing there: e"]
+    told = section(report(run(a={**POLICIES, "new": 3}, b=POLICIES, e={"limp": 1})).transfers[0])
+    assert told.notes == [
+        "not compared, since a policy is missing there: e",
+        "not compared, since too few simulators have it: new",
+    ]
 
 
 def test_terminal_markdown_and_page_tell_it_first(four: Report, tmp_path: Path) -> None:
