@@ -48,7 +48,8 @@ def runs_in(path: Path, executor: Executor) -> Iterator[Runs]:
     folder = RunFolder(path)
     with refusing(FolderError):
         folder.lock()
-    with closing(folder), refusing(NotResumed):
+    advice = "begin anew in another folder: --output DIR"
+    with closing(folder), refusing(NotResumed, kind=lambda why: BadInput(f"{why}; {advice}")):
         with refusing(RecordError):
             resumed = Resumed(folder) if folder.holds_run else None
         yield Runs(executor, printed(True), folder, resumed)

@@ -305,7 +305,8 @@ def span(text: str) -> Span:
 def duration(text: str) -> float:
     """A time in seconds, minutes or hours [s]."""
     form = r"(\d+\.?\d*|\.\d+)\s*(s|min|h)"
-    found = _matched(text, form, "give a time: 90s, 30min or 2h", lambda m: len(m[1]) < 10)
+    advice = "give a time: 90s, 30min or 2h"
+    found = _matched(text, form, advice, lambda m: len(m[1]) < 10 and float(m[1]) > 0)
     return float(found[1]) * {"s": 1.0, "min": 60.0, "h": 3600.0}[found[2].lower()]
 
 

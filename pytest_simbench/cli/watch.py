@@ -231,7 +231,8 @@ def _names(asked: Sequence[str]) -> list[str]:
     Raises:
         BadInput, SimulatorError: one is unknown, or has no index; with the valid choices.
     """
-    usable = [n for n in known() if not problem(n) and not adapter(n).info.system_packages]
+    infos = {name: adapter(name).info for name in known() if not problem(name)}
+    usable = [n for n, info in infos.items() if not (info.system_packages or info.program[0])]
     for name in asked:
         check_names([name])
         if name not in usable:

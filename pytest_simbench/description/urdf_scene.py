@@ -18,16 +18,7 @@ from pytest_simbench.description.shapes import capsule_hull, cylinder_hull, own_
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.description.urdf_check import MOVING, Description, read_xml
 from pytest_simbench.ground.errors import DescriptionError
-from pytest_simbench.scene import (
-    Coupling,
-    Gripper,
-    Joint,
-    Polytope,
-    Pose,
-    Robot,
-    Scene,
-    SceneError,
-)
+from pytest_simbench.scene import Coupling, Gripper, Joint, Polytope, Pose, Robot, Scene, SceneError
 from pytest_simbench.scene.robot import FASTEST, FREE, WIDEST
 
 ABOVE = 3
@@ -133,7 +124,10 @@ class _World(Description):
             tool_frame=self.root,
             couplings=couplings,
         )
-        lift = max(0.0, -_lowest(robot))
+        try:
+            lift = max(0.0, -_lowest(robot))
+        except DescriptionError as error:  # of the file that is kept
+            raise DescriptionError(str(error).replace(robot.urdf, self.path)) from None
         robot = replace(robot, base=Pose.at(0.0, 0.0, lift))
         self._tell_all(moving, lift)
         name = path.stem.strip(" .") or "scene"

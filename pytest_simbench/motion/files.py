@@ -94,6 +94,7 @@ class _Reader:
         for name, place in table.every("packages", FileTable.text).items():
             self.packages[name] = str(folder / place)
         self.urdf = self._path(table.text("urdf"))
+        self.srdf = self._path(table.text("srdf")) if "srdf" in table else None
         self._locked, self._changed = table.every("locked", FileTable.number), False
         description = Description(self.urdf, self.packages, self._adapt)
         self.moving = _moving(description.joints)
@@ -118,7 +119,6 @@ class _Reader:
         swing = self._swing(len(names)) if "throw" in table else None
         position, yaw = table.each("base", 3, 0.0), table.number("yaw", 0.0)
         stand = Pose.at(*table.each("stand", 3), yaw=yaw) if "stand" in table else None
-        srdf = self._path(table.text("srdf")) if "srdf" in table else None
         robot = Robot(
             name=self.name,
             urdf=self.urdf,
@@ -134,7 +134,7 @@ class _Reader:
             self_collide=table.flag("self_collide", False),
         )
         table.close()
-        robot = _with_files(robot, hand, srdf)
+        robot = _with_files(robot, hand, self.srdf)
         limits = replace(limits, finger_speed=hand.speed)
         if not measured:
             limits = replace(limits, levers=levers_of(RobotModel(robot)))
@@ -280,7 +280,7 @@ def _with_files(robot: Robot, hand: _Hand, srdf: str | None) -> Robot:
 
 
 def _standing(robot: Robot) -> Robot:
-    """The robot, if the arm carries the hand, and nothing touches where it begins."""
+    """The robot, if the arm carries the hand, can throw so, and nothing touches where it begins."""
     model = RobotModel(robot)
     carrier = model.pin.frames[model.tool].parentJoint
     if carrier != model.arm:
@@ -288,6 +288,8 @@ def _standing(robot: Robot) -> Robot:
             f"the tool frame {robot.tool_frame!r} hangs on {model.pin.names[carrier]!r}, not on "
             f"{model.pin.names[model.arm]!r}, the last joint of the arm"
         )
+    if any((np.clip(arm, model.lower, model.upper) != arm).any() for arm in robot.swing or ()):
+        raise DescriptionError("[throw]: start or end lies outside the limits of the joints")
     ready = robot.column("initial_position")[: model.arm]
     touching = PlanningScene(model, Scene("ready", (), robot)).collision(ready)
     if touching is not None:

@@ -16,7 +16,9 @@ import numpy as np
 
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.world import World
+from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError
+from pytest_simbench.motion.grasping import choose
 from pytest_simbench.motion.grips import grips
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_path
 from pytest_simbench.motion.model import RobotModel
@@ -122,16 +124,17 @@ class Carrying(Task):
         return replace(self, still=1.0)
 
     def problem(self) -> str | None:
-        """The hand cannot hold the thing, or cannot reach it."""
+        """The hand cannot hold the thing, or cannot come down to it or carry it aside."""
         model = RobotModel(self.arm)
         robot, rng = model.robot, np.random.default_rng(0)
         if not model.has_parallel_fingers:
             return f"robot {robot.name!r} has no two parallel fingers, so no squeeze [N] is known"
         home = robot.column("initial_position")[: model.arm]
         try:
-            tool = grips(robot, self.thing(Pose()))[0].tool.translated(z=APPROACH)
-            for way in (0.0, WAY):
-                inverse_kinematics(model, tool.translated(y=way), home, rng)
+            tools = [grip.tool for grip in grips(robot, self.thing(Pose()))]
+            planning = PlanningScene(model, Scene(self.name, (), robot))
+            found = choose(planning, tools, APPROACH, home, home, rng)
+            inverse_kinematics(model, found.tool.translated(y=WAY, z=APPROACH), found.above, rng)
         except PlanningError as error:
             return f"robot {robot.name!r} cannot carry the {self.shape}: {error}"
         return None

@@ -11,13 +11,7 @@ from pytest_simbench.client.world import World
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import FloatArray, Trajectory
 from pytest_simbench.tasks.base import Count, Outcome
-from pytest_simbench.tasks.on_scene import (
-    FARTHEST,
-    OnJoints,
-    places,
-    started,
-    ways,
-)
+from pytest_simbench.tasks.on_scene import FARTHEST, OnJoints, places, started, ways
 from pytest_simbench.tasks.resting import LOG_PERIOD, RESTLESS, rates, rest
 
 

@@ -58,8 +58,8 @@ ASIDE = 0.25
 """By which share of the clearance the arm aims beside the hole at most, in x and in y."""
 
 ABOVE, STEP, SLOW = 0.005, 0.002, 0.3
-"""From where the peg is lowered, above the chamfer, and how far at a time [m]; at which share of
-the joints' speed limits."""
+"""From where the peg is lowered, above the chamfer, and about how far at a time [m]; at which share
+of the joints' speed limits."""
 
 JUDGED = 3.0
 
@@ -98,7 +98,7 @@ class Inserting(Task):
             Metric("inserted", "inserted", kind="yes_no",
                    doc="its end is in the hole by 0.8 of the depth that was told, or more"),
             Metric("depth", "depth", unit="mm", better=None,
-                   doc="of the middle of its end in the hole"),
+                   doc="of the middle of its end in the hole, where it is over that"),
             Metric("overlap", "overlap", unit="mm", better="lower", least=0, resolution=0.01,
                    doc="of peg and hole at the end, the deepest"),
             Metric("force", "peak force", unit="N", better=None, least=0,
@@ -215,13 +215,13 @@ class Inserting(Task):
             reasons.append(str(error))
         world.mark("end")
         pose = world.pose("peg")
-        depth = HIGH - (pose * Pose.at(0.0, 0.0, -LONG / 2)).position[2]
+        *beside, depth = np.subtract((*HOLE, HIGH), (pose * Pose.at(0.0, 0.0, -LONG / 2)).position)
         inserted = not reasons and depth > 0.8 * self.depth
         count(int(inserted), 1)
         peg = self.peg(Pose()).moved_to(pose)
         found: dict[str, float | None] = {
             "inserted": float(inserted),
-            "depth": 1000 * depth,
+            "depth": 1000 * float(depth) if np.hypot(*beside) < WIDE / 2 else None,
             "overlap": 1000 * max(0.0, *(penetration(peg, body) for body in self.hole())),
             "force": max(forces, default=None),
         }
@@ -234,9 +234,11 @@ class Inserting(Task):
     def lower(self, hand: Manipulator, forces: list[float]) -> None:
         """Straight down, step by step, and the force of the hole on the peg after each [N]; none
         where the simulator does not tell forces of this scene."""
-        names = [body.name for body in self.hole()]
-        for _ in range(round((ABOVE + CHAMFER + self.depth) / STEP)):
-            hand.move_straight(hand.tool.translated(z=-STEP), speed=SLOW, ignored=tuple(names))
+        names = tuple(body.name for body in self.hole())
+        whole = ABOVE + CHAMFER + self.depth
+        steps = round(whole / STEP)
+        for _ in range(steps):
+            hand.move_straight(hand.tool.translated(z=-whole / steps), speed=SLOW, ignored=names)
             found = told_forces(hand.world)
             if found is None:
                 continue

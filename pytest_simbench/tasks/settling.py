@@ -17,13 +17,7 @@ from pytest_simbench.scene import Body, FloatArray, Pose, Scene, SceneError
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
-from pytest_simbench.tasks.on_scene import (
-    FARTHEST,
-    OnScene,
-    places,
-    started,
-    ways,
-)
+from pytest_simbench.tasks.on_scene import FARTHEST, OnScene, places, started, ways
 from pytest_simbench.tasks.resting import FORCE_JITTER, RESTLESS, calm, spread
 
 
@@ -194,16 +188,19 @@ def _ends(world: World) -> dict[str, Body]:
 
 
 def deepest(scene: Scene, ends: Mapping[str, Body]) -> float:
-    """How deep any free body is in another body or in the ground [m]; 0 where none is."""
+    """How deep any free body is in another body or in the ground [m], of pairs that collide; 0
+    where none is."""
     bodies = [*ends.values(), *scene.fixed_bodies]
     down = np.array([[0.0, 0.0, -1.0]])
     depths = [0.0]
     for k, body in enumerate(ends.values()):
-        depths.append(float(body.reach_placed(down)[0]))
+        own = f"body/{body.name}"
+        if not scene.kept_apart("ground", own):
+            depths.append(float(body.reach_placed(down)[0]))
         depths += [
             penetration(body, other)
             for other in bodies[k + 1 :]
-            if not scene.kept_apart(f"body/{body.name}", f"body/{other.name}")
+            if not scene.kept_apart(own, f"body/{other.name}")
         ]
     return max(depths)
 

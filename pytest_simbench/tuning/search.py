@@ -95,7 +95,7 @@ class Search:
         if seconds < FEWEST * took and most is None:
             raise TuningError(
                 f"{seconds:.0f} s are too few to search: today's settings alone took {took:.0f} s; "
-                f"give a budget of at least {1 + 4 * took / 60:.0f}min"
+                f"give a budget of at least {1 + 4 * took / 60:.0f}min for each simulator"
             )
         study = self._study(library)
         known = {self._key({}): today}

@@ -138,15 +138,15 @@ class Trials:
         """The settings that the search began with; the time-outs of the others follow.
 
         Raises:
-            TuningError: every repetition fails.
+            TuningError: no repetition has a cost and an error.
         """
         found = Candidate("today", {})
         for one in (*self._finer(""), found):
             for _ in self._looks(one, self.target.chosen):
                 pass
-            if not (one.costs if one is found else any(r.ok for r in one.records.values())):
+            if not (one.costs and one.errors):
                 record = next(iter(one.records.values()))
-                why = record.error.message if record.error else "they fail"
+                why = record.error.message if record.error else "none has a cost and an error"
                 what = "today's settings" if one is found else f"{FINER} times as many steps"
                 raise TuningError(f"{what} cannot be judged: {why:.300}")
         took = [record.cost("total") or 0.0 for record in found.records.values()]

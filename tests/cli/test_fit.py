@@ -114,3 +114,6 @@ def test_no_unknown_and_no_time(folder: Path, capsys: pytest.CaptureFixture[str]
     assert "name what is unknown: --unknown NAME; choose from" in capsys.readouterr().err
     assert main([*BOTH, "--budget", "0.5s"]) == 130
     assert "the budget is used up after" in capsys.readouterr().out
+    (folder / "drive.xml").write_text(DRIVE.format(25, 13))
+    assert main(BOTH) == 2
+    assert "begin anew in another folder: --output DIR" in capsys.readouterr().err

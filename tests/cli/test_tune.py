@@ -130,6 +130,7 @@ def test_killed_and_gone_on_with(tmp_path: Path) -> None:
         ("stacking --sim mujoko", "unknown simulator 'mujoko'; choose from"),
         ("stacking --sim mujoco --settings condim", "no setting 'condim' to search"),
         ("stacking --sim mujoco --budget 5", "give a time: 90s, 30min or 2h"),
+        ("stacking --sim mujoco --budget 0s", "give a time: 90s, 30min or 2h"),
         ("stacking --sim mujoco --profile tuned,real", "give one profile"),
         ("stacking --sim mujoco --profile no.toml", "cannot read the profile no.toml"),
         ("stacking --sim mujoco --profile best", "no simulator has a settings profile"),

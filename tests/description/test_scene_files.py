@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.description import mjcf_check
-from pytest_simbench.description.carried import (
-    Carried,
-    keep,
-    kept,
-    markdown,
-    named,
-    terminal_lines,
-)
+from pytest_simbench.description.carried import Carried, keep, kept, markdown, named, terminal_lines
 from pytest_simbench.description.mjcf_check import check_mjcf
 from pytest_simbench.description.starts import distinct, read_starts
 from pytest_simbench.ground.errors import DescriptionError

@@ -187,6 +187,12 @@ def test_what_cannot_be_is_one_sentence(tmp_path: Path, old: str, new: str, why:
         read(tmp_path, (old, new))
 
 
+def test_a_link_without_mass_is_told_with_the_users_file(tmp_path: Path) -> None:
+    inertial = CABINET[CABINET.index('<inertial><mass value="2') :].partition("</inertial>")[0]
+    with pytest.raises(DescriptionError, match=r"/cabinet.urdf: link 'drawer' .* has no mass"):
+        read(tmp_path, (f"{inertial}</inertial>", ""))
+
+
 def test_without_a_file_or_a_joint_there_is_no_scene(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"cabinet.urdf is not valid XML"):
         read(tmp_path, ("</robot>", ""))

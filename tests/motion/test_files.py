@@ -184,6 +184,14 @@ def more(text: str, before: str = "") -> Change:
 
 
 HULLS = "hull_corners = 99"
+
+
+def test_a_package_also_holds_the_link_pairs_of_an_arm_with_hulls(tmp_path: Path) -> None:
+    (tmp_path / "small.srdf").write_text('<robot name="small"/>')
+    toml = TOML.replace("[arm]", 'srdf = "package://mine/small.srdf"\npackages.mine = "."\n[arm]')
+    assert read_robot(small_arm(tmp_path, f"{HULLS}\n{toml}")).srdf
+
+
 SWING = "[throw]\nstart = [0.1, 0.2, 0.3]\nend = "
 LOOP = '<mimic joint="right_finger"/></joint>'
 SRDF = swap("[arm]", 'srdf = "small.toml"\n[arm]')
@@ -278,6 +286,9 @@ IN_TOML = {
     "a tool beside no link": (
         lambda text: swap('"grip"', '"grab"')(text) + "xyz = [0.0, 0.0, 0.0]\n",
         r"the tool frame 'grab' is no link; choose from foot, column, upper, lower",
+    ),
+    "a swing out of the limits": (
+        more(SWING + "[0.4, 0.5, 2.6]"), r"\[throw\]: start or end lies outside the limits of the j"
     ),
     "a swing of too few angles": (more(SWING + "[0.4, 0.5]"), r"\[throw\]: end: give it 3 numbers"),
     "a swing with more in it": (

@@ -73,6 +73,9 @@ def test_who_cannot_carry_it_is_told_beforehand() -> None:
     assert problem is not None
     assert problem.startswith("robot 'so101' has no two parallel fingers")
     assert TASK.on(find("xarm7")).problem() is None
+    problem = TASK.on(find("ur5")).problem()  # it reaches above it, and not down from there
+    assert problem is not None
+    assert "cannot carry the cube: unreachable: tool at (0.450, -0.150, 0.025)" in problem
 
 
 @pytest.mark.parametrize("task", [TASK, Slipping(still=1.0)], ids=lambda task: task.name)

@@ -66,11 +66,12 @@ def test_the_hole_is_as_wide_as_it_says(section: Section, clearance: float) -> N
     assert filled(inside + CHAMFER / 2 + 1e-6, 0.0, HIGH + CHAMFER / 2)
 
 
-@pytest.mark.parametrize("section", SECTIONS)
-def test_a_perfect_arm_inserts(section: Section) -> None:
-    outcome = inserted(Inserting(section, 2e-3))
+@pytest.mark.parametrize(("section", "depth"), [("square", 25), ("round", 25), ("square", 4)])
+def test_a_perfect_arm_inserts(section: Section, depth: float) -> None:
+    """As deep as it is told, also where that is no whole number of steps."""
+    outcome = inserted(Inserting(section, 2e-3, depth / 1000))
     assert outcome.metrics == pytest.approx(
-        {"inserted": 1.0, "depth": 25.0, "overlap": 0.0, "force": 5.0}, abs=1e-3
+        {"inserted": 1.0, "depth": depth, "overlap": 0.0, "force": 5.0}, abs=1e-3
     )
     assert outcome.reasons == ()
     assert 0.0 < np.abs(outcome.details["aside"]).max() < ASIDE * 2e-3 <= 2e-3 / 2
@@ -88,8 +89,8 @@ def test_what_stands_in_a_wall_and_what_falls_are_told() -> None:
     assert outcome.metrics["overlap"] == pytest.approx(0.5 + beside, abs=1e-3)
     short = inserted(Inserting(clearance=2e-3), Mishap("insert", 0.1, slip(z=-0.01)))
     assert (short.metrics["inserted"], short.metrics["depth"]) == (0.0, pytest.approx(15, abs=1e-3))
-    fallen = inserted(Inserting(), Mishap("bring", 0.2, slip(z=-0.05)))
-    assert fallen.metrics["inserted"] == 0.0
+    fallen = inserted(Inserting(), Mishap("bring", 0.2, slip(x=0.05)))
+    assert (fallen.metrics["inserted"], fallen.metrics["depth"]) == (0.0, None)
     assert fallen.reasons == ("peg is not in the hand",)
 
 

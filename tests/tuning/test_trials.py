@@ -103,8 +103,10 @@ def test_what_a_smaller_step_gives_is_right(tmp_path: Path) -> None:
     assert {("converged-held_out", 6), ("today-held_out", 6)} < {*executor.asked}
 
 
-def test_a_smaller_step_that_never_works(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("score", "why"), [(None, "it hangs"), (float("nan"), "none has a cost")])
+def test_a_smaller_step_that_never_works(tmp_path: Path, score: float | None, why: str) -> None:
+    """Where it has no value each candidate would be right, and the cheapest recommended."""
     of = replace(target(), converged=True)
-    looks, _ = trials(tmp_path, lambda s, k: None if s["timestep"] < 0.001 else 1.0, of)
-    with pytest.raises(TuningError, match="8 times as many steps cannot be judged: it hangs"):
+    looks, _ = trials(tmp_path, lambda s, k: score if s["timestep"] < 0.001 else 1.0, of)
+    with pytest.raises(TuningError, match=f"8 times as many steps cannot be judged: {why}"):
         looks.today()
