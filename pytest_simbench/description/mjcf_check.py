@@ -15,12 +15,21 @@ MOST = {"body": 2000, "geom": 20_000}
 ABOVE = 2
 """So many folders above its own may hold what a scene names: packages keep shared parts beside."""
 
-FOLDERS = {"mesh": "meshdir", "hfield": "meshdir", "skin": "meshdir", "texture": "texturedir"}
-"""Elements that name a file, and what names its folder."""
+MESHES = ("mesh", "hfield", "skin", "flexcomp")
+FOLDERS = {**dict.fromkeys(MESHES, "meshdir"), "texture": "texturedir", "model": ""}
+"""Elements that name a file, and what names its folder; a <model> stands beside the scene."""
+
+SIDES = ("right", "left", "up", "down", "front", "back")
+FILES = ("file", "content", *(f"file{side}" for side in SIDES))
+"""Attributes that name one."""
 
 
-def check_mjcf(path: str) -> None:
-    """Look at a file and all that it includes.
+def check_mjcf(path: str, room: Path | None = None, above: tuple[Path, ...] = ()) -> None:
+    """Look at a file and all that it includes and attaches.
+
+    Args:
+        room: in which all its files must be; None: around the file.
+        above: files that attach this one.
 
     Raises:
         DescriptionError: one sentence with the file and the line.
@@ -28,14 +37,14 @@ def check_mjcf(path: str) -> None:
     main = Path(path)
     root = main.parent.resolve()
     lines: dict[ET.Element, tuple[Path, int]] = {}
-    room = _room(root)
+    room = room or _room(root)
     elements = _included(main, root, room, (), lines)
     folders: dict[str, str] = {}
     count = dict.fromkeys(MOST, 0)
     for element in elements:
         if element.tag == "compiler":
             assets = element.get("assetdir")
-            for folder in FOLDERS.values():
+            for folder in ("meshdir", "texturedir"):
                 told = element.get(folder, assets)
                 if told is not None:
                     folders[folder] = told
@@ -48,9 +57,12 @@ def check_mjcf(path: str) -> None:
                 )
     for element in elements:
         folder = folders.get(FOLDERS.get(element.tag, ""), "")
-        for key in ("file", "content"):
+        for key in FILES:
             if element.tag in FOLDERS and element.get(key):
-                _inside(str(Path(folder) / element.get(key, "")), root, room, lines[element])
+                name = str(Path(folder) / element.get(key, ""))
+                other = _inside(name, root, room, lines[element])
+                if element.tag == "model" and other not in (*above, main.resolve()):
+                    check_mjcf(str(other), room, (*above, main.resolve()))
 
 
 def _room(root: Path) -> Path:

@@ -69,6 +69,9 @@ REFUSED = {
     "the file '/etc/passwd' lies out": '<mujoco><include file="/etc/passwd"/></mujoco>',
     "the file '../../../a/m.stl' lies out": '<mujoco><compiler meshdir="../../../a"/>'
     '<mesh file="m.stl"/></mujoco>',
+    "line 1: the file '/etc/passwd' lies out": '<mujoco><model file="/etc/passwd"/></mujoco>',
+    "line 1: the file '/a.png' lies out": '<mujoco><texture fileright="/a.png"/></mujoco>',
+    "line 1: the file '/a.msh' lies out": '<mujoco><flexcomp file="/a.msh"/></mujoco>',
     "more than 3 elements <body>": f"<mujoco>{4 * '<body/>'}</mujoco>",
 }
 
@@ -94,6 +97,13 @@ def test_a_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
     (folder / "a.xml").write_text('<mujoco><mesh file="m.stl"/></mujoco>')
     with pytest.raises(DescriptionError, match="lies out"):
         check_mjcf(str(folder / "a.xml"))
+
+
+def test_a_file_that_is_attached_is_looked_at_too(tmp_path: Path) -> None:
+    (tmp_path / "a.xml").write_text('<mujoco><model file="b.xml"/></mujoco>')
+    (tmp_path / "b.xml").write_text('<mujoco><model file="a.xml"/><mesh file="/m.stl"/></mujoco>')
+    with pytest.raises(DescriptionError, match="b.xml, line 1: the file '/m.stl' lies out"):
+        check_mjcf(str(tmp_path / "a.xml"))
 
 
 def test_files_beside_are_read_but_a_whole_home_is_no_room(
