@@ -90,6 +90,7 @@ class Case:
         attempt: of the same repetitions in this process, see `records.record`.
         robot: that does the tasks; None for the tasks' own.
         file: the file that the profile is of; None for one of the adapter's.
+        needs: options with the user's own files that the test is made of, as they are typed.
         own_timestep: of the profile [s], where `changes` has another one for a sweep over steps;
             its records tell it (`notes`), and so that they belong to a sweep.
     """
@@ -124,6 +125,7 @@ class Case:
     robot: Robot | None = None
     own_timestep: float | None = None
     file: ProfileFile | None = None
+    needs: tuple[str, ...] = ()
 
     @classmethod
     def of(

@@ -307,6 +307,7 @@ class Repetition:
             own_timestep=case.own_timestep,
             chosen_on=case.chosen_on,
             profile_file=case.file.path if case.file else "",
+            needs=case.needs,
             sample=self.experiment.task.sample(self.seed),
             reading=outcome.reading,
             wait=outcome.wait,

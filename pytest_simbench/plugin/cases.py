@@ -11,6 +11,7 @@ import pytest
 
 from pytest_simbench.cli.values import refusing
 from pytest_simbench.plugin import arguments, cluster, options, recording
+from pytest_simbench.plugin.policies import FIXTURE as POLICY
 from pytest_simbench.plugin.session import session_of
 
 if TYPE_CHECKING:
@@ -45,12 +46,14 @@ def case_of(
     session = session_of(config)
     chosen, this = session.selection, session.run
     elsewhere = cluster.asked(config)  # nodes find interpreters and displays themselves
-    timeout, of_test = options.value(config, "sim_timeout"), {"test": "simulator"}
+    timeout = options.value(config, "sim_timeout")
+    of_test: dict[str, Any] = {"test": "simulator"}
     own: Mapping[str, Any] = {}
     if item is not None:
         function, others = named(item, made_for.id_with(len(chosen.profiles)))
         of_test = {"test": item.nodeid, "function": function, "variant": others}
         timeout = timeout if timeout is not None else number_mark(item, "sim_timeout")
+        of_test |= {"needs": _needs(item)}
         own = arguments.checked_settings(settings, made_for, chosen)
     return chosen.case(
         made_for,
@@ -64,6 +67,16 @@ def case_of(
         **{name: options.value(config, f"sim_{name}") for name in OF_CASES},
         **of_test,
     )
+
+
+def _needs(item: pytest.Item) -> tuple[str, ...]:
+    """The options with files of the user's that a test is made of, as they are typed."""
+    fixtures = getattr(item, "fixturenames", ())
+    policies = options.value(item.config, "sim_policies") if POLICY in fixtures else None
+    scene = options.value(item.config, "sim_scene") if "scene_file" in fixtures else None
+    typed = ",".join(f"{path}:{name}" if name else path for path, name in policies or ())
+    given = {"policies": typed, "scene": scene}
+    return tuple(f"--sim-{option}={files}" for option, files in given.items() if files)
 
 
 def _display(this: Run) -> Displays:

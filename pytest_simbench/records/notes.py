@@ -41,6 +41,7 @@ class Notes:
         own_timestep: the time step that its profile has [s], where a sweep took another one.
         chosen_on: by what its settings were chosen.
         profile_file: the file that its profile is of, as it was given.
+        needs: options with the user's own files, without which its test is not there.
         sample: the measured motion that it was held against.
         reading: of a law: measured, right, and the tolerance.
         wait: for the count.
@@ -59,6 +60,7 @@ class Notes:
     own_timestep: float | None = None
     chosen_on: tuple[Seen, ...] = ()
     profile_file: str = ""
+    needs: tuple[str, ...] = ()
     sample: Sample | None = None
     reading: Reading | None = None
     wait: Wait | None = None

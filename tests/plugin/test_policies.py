@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from fnmatch import fnmatchcase
 
 import pytest
@@ -39,6 +40,21 @@ from pytest_simbench.tasks import Reaching
 def test_reaching(repeat, policy):
     repeat(Reaching(policy, seconds=0.2, settle=0.0, rate=10.0))
 """
+
+
+def test_the_command_that_runs_a_failed_one_again_names_its_file(
+    pytester: pytest.Pytester,
+) -> None:
+    claiming = TESTS.replace("    repeat(", "    assert not repeat(")
+    pytester.makepyfile(mine=MINE, test_it=claiming)
+    result = pytester.runpytest_subprocess(
+        "--sim=mujoco", "--reps=1", "--policies=mine.py:nothing,mine.py:still"
+    )
+    result.assert_outcomes(failed=2)
+    again = next(line for line in result.outlines if "again: pytest" in line)
+    assert "--sim-policies=mine.py:nothing,mine.py:still" in again
+    words = shlex.split(again.partition("again: pytest ")[2])
+    pytester.runpytest_subprocess(*words).assert_outcomes(failed=1)
 
 
 def test_a_test_is_made_for_each_policy_of_its_task(pytester: pytest.Pytester) -> None:

@@ -237,6 +237,7 @@ def command(record: Record) -> str:
         *[f"--sim-robot={record.robot.get('name')}"] * bool(record.robot),
         *["--sim-gui"] * (record.mode == "gui"),
         *[f"--sim-set={record.simulator}.timestep={step!r}"] * record.swept,
+        *record.notes.needs,
     ]
     if not all(map(str.isprintable, options)):
         return ""
