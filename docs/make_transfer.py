@@ -5,14 +5,15 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable
+from itertools import combinations
 
 import numpy as np
 from tables import DATA, NAMES, table
 
+from pytest_simbench.measure.comparison import ALPHA, holm
 from pytest_simbench.measure.transfer import METRIC, POLICY, Ceiling, Transfer
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.markdown.run import table as columns
-from pytest_simbench.report.model.transfer import interval, section
+from pytest_simbench.report.model.transfer import interval
 
 FILE, TASK = DATA / "transfer.csv", "pushing_to_goal"
 FIRST, LAST = 2000, 10_000
@@ -41,10 +42,12 @@ def read(records: Iterable[Record]) -> None:
             writer.writerow((*key, "".join(found[key][seed] for seed in seeds)))
 
 
-def transfer() -> Transfer:
-    """All simulators, and the seeds that all of them have; policies by success, best first."""
-    kept = signs()
-    own = [name for name in NAMES if any(name == who for who, _ in kept)]
+OWN = [name for name in NAMES if any(name == who for who, _ in signs())]
+
+
+def transfer(*own: str) -> Transfer:
+    """Of simulators, with the seeds that all of them have; policies by success, best first."""
+    kept = {(who, policy): line for (who, policy), line in signs().items() if who in own}
     policies = sorted({policy for _, policy in kept})
     seeds = min(map(len, kept.values()))
     rows = [[[*kept[who, policy][:seeds]] for policy in policies] for who in own]
@@ -57,7 +60,7 @@ def transfer() -> Transfer:
 def matrix() -> str:
     """Success of each policy on each simulator with all of its seeds, and how far its rankings can
     be trusted."""
-    kept, found, rows = signs(), transfer(), []
+    kept, found, rows = signs(), transfer(*OWN), []
     for who, _, _ in found.simulators:
         outcomes = np.array([[*kept[who, policy]] for policy in found.policies]) == "1"
         ceiling = Ceiling(outcomes.astype(float))
@@ -69,5 +72,12 @@ def matrix() -> str:
 
 
 def ranks() -> str:
-    """tau-b of each two simulators, and their ceilings, as a report has them."""
-    return columns(section(transfer()).tables[1].columns)
+    """tau-b of each two simulators with the seeds that both have; bold: they rank differently."""
+    pairs = {pair: transfer(*pair) for pair in combinations(OWN, 2)}
+    p_values = holm([found.pairs[0, 1].p_value for found in pairs.values()])
+    told = {}
+    for (pair, found), p_value in zip(pairs.items(), p_values, strict=True):
+        cell = f"{found.pairs[0, 1].tau.mean:.2f} ({found.seeds})"
+        told[pair] = f"**{cell}**" if p_value <= ALPHA else cell
+    rows = [[NAMES[one], *(told.get((one, other), "") for other in OWN[1:])] for one in OWN[:-1]]
+    return table(("tau-b (seeds)", *(NAMES[who] for who in OWN[1:])), rows)
