@@ -88,9 +88,11 @@ class ResultSet:
         return self._ok[1]
 
     def sole(self, name: str) -> bool:
-        """Whether a metric has one value, which every repetition there could be would have."""
-        claimed = name in self.metrics and all(record.notes.sole for record in self.records)
-        return claimed and len({*self.values(name)}) == 1
+        """Whether a metric (no cost), or whether it crashes, is one value, which every repetition
+        there could be would have."""
+        found: Iterable[float] = self.values(name) if name in self.metrics else ()
+        found = self.crashed_by_seed().values() if name == CRASHED.name else found
+        return all(record.notes.sole for record in self.records) and len({*found}) == 1
 
     @property
     def crashed(self) -> tuple[Record, ...]:
@@ -149,10 +151,12 @@ class ResultSet:
         key = (name, confidence)
         if key not in self._intervals:
             found = interval(self.values(name), self.metric(name), confidence)
-            if self.sole(name):
-                found = replace(found, low=-inf, high=inf, method="constant")
-            self._intervals[key] = found
+            self._intervals[key] = self._certain(name, found)
         return self._intervals[key]
+
+    def _certain(self, name: str, found: Interval) -> Interval:
+        """An interval, without bounds where there is one value."""
+        return replace(found, low=-inf, high=inf, method="constant") if self.sole(name) else found
 
     def crash_interval(self, confidence: float = CONFIDENCE) -> Interval:
         """The interval of the share of repetitions that crash, interrupted ones left out.
@@ -170,7 +174,7 @@ class ResultSet:
         """The interval by which claims about a metric, or about crashes, are judged."""
         level = confidence(metric, self.error)
         if metric is CRASHED:
-            return self.crash_interval(level)
+            return self._certain(CRASHED.name, self.crash_interval(level))
         return self.interval(metric.name, level)
 
     def _decide(self, claim: Bound, interval: Callable[[], Interval]) -> Judgement:

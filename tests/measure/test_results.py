@@ -245,6 +245,7 @@ def test_the_one_value_that_all_repetitions_would_have_is_judged_as_it_is(name: 
     result = ResultSet([record(1, metrics={name: 1.0}).noting(sole=True)], METRICS)
     result.strict = True
     result.assert_at_least(name, 0.9)
+    result.assert_crashed_at_most(0.1)
     with pytest.raises(AssertionError, match="the same in all repetitions, 1 repetition"):
         result.assert_at_most(name, 0.9)
 
