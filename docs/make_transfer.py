@@ -34,12 +34,13 @@ def read(records: Iterable[Record]) -> None:
         if not late and r.profile == "tuned" and r.seed <= LAST and r.status != "interrupted":
             sign = "x" if r.status == "failed" else f"{r.metrics[METRIC]:.0f}"
             found.setdefault((r.simulator, str(r.settings[POLICY])), {})[r.seed] = sign
+    rows = []  # all of them first: a seed that is missing must not cost the file
+    for key in sorted(found):
+        seeds = range(FIRST, FIRST + len(found[key]))
+        rows.append((*key, "".join(found[key][seed] for seed in seeds)))
     with FILE.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("simulator", "policy", "seeds"))
-        for key in sorted(found):
-            seeds = range(FIRST, FIRST + len(found[key]))
-            writer.writerow((*key, "".join(found[key][seed] for seed in seeds)))
+        writer.writerows([("simulator", "policy", "seeds"), *rows])
 
 
 OWN = [name for name in NAMES if any(name == who for who, _ in signs())]
