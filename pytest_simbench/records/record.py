@@ -10,7 +10,7 @@ from typing import Any, Literal, TypedDict
 
 from pytest_simbench.records import checked
 from pytest_simbench.records.checked import Count, Name, Positive, Size
-from pytest_simbench.records.metrics import COSTS, Metric
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.upgrade import upgraded
 
@@ -129,13 +129,16 @@ class Record:
         return replace(self, notes=replace(self.notes, **notes))
 
     def value(self, metric: Metric) -> float | None:
-        """What it counts with at a metric of its task, or at a cost; None where it has no value.
+        """What it counts with at a metric of its task, a cost, or `CRASHED`; None where it has no
+        value.
 
         A crashed repetition counts with the worst value, where the metric has one
         (`Metric.crashed`), but by the study's rules (`--protocol paper`), which leave it out. The
         costs of a crashed repetition are none.
         """
-        if self.status == "ok":
+        if metric is CRASHED:
+            return None if self.status == "interrupted" else float(not self.ok)
+        if self.ok:
             found = self.metrics.get(metric.name)
             return self.cost(metric.name) if found is None and metric in COSTS else found
         counts = self.status == "failed" and self.protocol != "paper"
