@@ -32,7 +32,9 @@ from published_runs import PUBLISHED
 from tables import DATA, DOCS, table
 
 from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.report.markdown.capabilities import all_capabilities
+from pytest_simbench.report.markdown.run import table as markdown
+from pytest_simbench.report.model.capabilities import columns
+from pytest_simbench.simulator.registry import adapter, registered
 
 README = DOCS.parent / "README.md"
 MARK = re.compile(r"<!-- made: ([\w ]+) -->\n(?:(?:(?!<!-- made:).)*?<!-- end -->\n?)?", re.S)
@@ -64,7 +66,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "commands": make_options.commands,
     "marks": make_options.marks,
     "fixtures": make_options.fixture_table,
-    "capabilities": all_capabilities,
+    "capabilities": lambda: markdown(columns([adapter(name).info for name in registered()])),
     "known_failures": make_options.known_failures,
 }
 """By the first word of a mark, the others are arguments; beside those of `make_results`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from importlib.metadata import version
 from pathlib import Path
 
@@ -61,11 +62,8 @@ def _missing(cluster: str | None, builds: dict[str, str]) -> Missing:
     from pytest_simbench.cluster.offers import unmet
     from pytest_simbench.cluster.pool import Pool
 
-    pool = Pool(cluster)
-    try:
+    with closing(Pool(cluster)) as pool:
         nodes = pool.nodes()
-    finally:
-        pool.close()
     return lambda name: unmet(nodes, name, ["headless"])
 
 

@@ -6,7 +6,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, NamedTuple, TypedDict
 
 from pytest_simbench.records import checked
 from pytest_simbench.records.checked import Count, Name, Positive, Size
@@ -44,6 +44,14 @@ class Failure:
     def cause(self) -> str:
         """Type and phase: what failures are counted by."""
         return f"{self.type} in {self.phase}" if self.phase else self.type
+
+
+class Who(NamedTuple):
+    """What did a repetition: a simulator as named, its mode and profile."""
+
+    simulator: str
+    mode: str
+    profile: str
 
 
 @dataclass(frozen=True)
@@ -108,6 +116,10 @@ class Record:
     @property
     def ok(self) -> bool:
         return self.status == "ok"
+
+    @property
+    def who(self) -> Who:
+        return Who(self.simulator, self.mode, self.profile)
 
     @property
     def label(self) -> str:
