@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 from common import arguments, write_run
@@ -40,8 +40,7 @@ def measure(folder: Path) -> dict[str, float]:
     times.append(time.process_time())
     write_files(folder, Report.of(reading))
     times.append(time.process_time())
-    metrics = [metric for task in reading.metrics.values() for metric in task]
-    limits = parse_limits("placed:5%,ram:10%,rtf:20%", metrics)
+    limits = parse_limits("placed:5%,ram:10%,rtf:20%", chain(*reading.metrics.values()))
     run_gate(reading.records, reading.records, limits, reading.metrics)
     times.append(time.process_time())
     parts = [end - begin for begin, end in pairwise(times)]
