@@ -100,7 +100,8 @@ class Perturbation:
         if self.quantity == "friction":
             return _with_friction(scene, factor)
         if self.quantity == "squeeze":
-            return _squeezing(scene, factor)
+            squeeze = factor * scene.arm.gripper.squeeze
+            return replace(scene, robot=scene.arm.squeezing(squeeze))
         body = scene.body(self.body)
         if self.quantity == "mass":
             return scene.with_body(body.changed(mass=body.mass * factor))
@@ -111,24 +112,11 @@ class Perturbation:
 
 
 def _with_friction(scene: Scene, factor: float) -> Scene:
-    bodies = tuple(body.changed(friction=body.friction * factor) for body in scene.bodies)
+    bodies = tuple(body.with_friction(body.friction * factor) for body in scene.bodies)
     robot = scene.robot and replace(scene.robot, friction=scene.robot.friction * factor)
     return replace(
         scene, bodies=bodies, robot=robot, ground_friction=scene.ground_friction * factor
     )
-
-
-def _squeezing(scene: Scene, factor: float) -> Scene:
-    robot = scene.robot
-    if robot is None:
-        raise ValueError(f"scene {scene.name!r} has no robot whose gripper could be perturbed")
-    fingers = robot.gripper.joints
-    joints = tuple(
-        replace(joint, effort_limit=joint.effort_limit * factor) if joint.name in fingers else joint
-        for joint in robot.joints
-    )
-    gripper = replace(robot.gripper, squeeze=robot.gripper.squeeze * factor)
-    return replace(scene, robot=replace(robot, joints=joints, gripper=gripper))
 
 
 def perturbed(scene: Scene, perturbations: Sequence[Perturbation]) -> Scene:

@@ -150,6 +150,17 @@ class Scene(Wire):
                     f"{1000 * depth:.1f} mm; move one of them"
                 )
 
+    @property
+    def arm(self) -> Robot:
+        """The robot.
+
+        Raises:
+            SceneError: it has none.
+        """
+        if self.robot is None:
+            raise SceneError(f"scene {self.name!r} has no robot")
+        return self.robot
+
     @cached_property
     def free_bodies(self) -> tuple[Body, ...]:
         """The bodies that can move, in scene order: the rows of every body state. They are those

@@ -83,9 +83,7 @@ class Arm:
         speeds: Speeds | None = None,
         scale: float = 1.0,
     ) -> None:
-        robot = world.scene.robot
-        if robot is None:
-            raise ValueError(f"scene {world.scene.name!r} has no robot")
+        robot = world.scene.arm
         self.world = world
         self.gripper = robot.gripper
         self.rng = rng

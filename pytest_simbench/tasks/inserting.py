@@ -270,17 +270,12 @@ def softened(robot: Robot, stiffness: float) -> Robot:
     Raises:
         PlanningError: it does not reach the hole.
     """
-    model, names = RobotModel(robot), {joint.name for joint in robot.arm_joints}
+    model = RobotModel(robot)
     home = robot.column("initial_position")[: model.arm]
     tool = tool_over(Pose.at(*HOLE, HIGH + LONG / 2), 0.0)
     arm = inverse_kinematics(model, tool, home, np.random.default_rng(0))
     level = model.tool_jacobian(arm)[:2]
     yielding = level**2 @ (1 / robot.column("stiffness")[: model.arm])
     share = stiffness * float(yielding.mean())
-    joints = tuple(
-        replace(joint, stiffness=share * joint.stiffness, damping=share * joint.damping)
-        if joint.name in names
-        else joint
-        for joint in robot.joints
-    )
-    return replace(robot, joints=joints)
+    names = (joint.name for joint in robot.arm_joints)
+    return robot.scaled(*names, stiffness=share, damping=share)

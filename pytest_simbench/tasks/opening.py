@@ -262,9 +262,7 @@ def _out(world: World) -> float:
 
 def _place(world: World) -> Pose:
     """Of the handle's middle: the drawer's frame."""
-    robot = world.scene.robot
-    assert robot is not None  # see `scene`
-    return link_poses(PreparedRobot(robot), world.joints[0])[DRAWER]
+    return link_poses(PreparedRobot(world.scene.arm), world.joints[0])[DRAWER]
 
 
 def _tool(world: World, hand: Manipulator) -> FloatArray:

@@ -114,33 +114,24 @@ def of_body(name: str, **values: Any) -> Plant:
 
 def of_robot(change: Callable[[Robot], Robot]) -> Plant:
     """Another robot."""
-    return lambda scene: replace(scene, robot=change(scenes.of_scene(scene)))
+    return lambda scene: replace(scene, robot=change(scene.arm))
 
 
-def of_joints(*names: str, farther: float = 0.0, **factors: float) -> Plant:
-    """Values of the joints' drives, multiplied; they start `farther` [rad]."""
-
-    def change(robot: Robot) -> Robot:
-        for joint in robot.joints:
-            if joint.name in names:
-                values = {key: factor * getattr(joint, key) for key, factor in factors.items()}
-                start = joint.initial_position + farther
-                robot = scenes.with_joint(robot, joint.name, initial_position=start, **values)
-        return robot
-
-    return of_robot(change)
+def of_joints(*names: str, **factors: float) -> Plant:
+    """Values of the joints' drives, multiplied."""
+    return of_robot(lambda robot: robot.scaled(*names, **factors))
 
 
 def with_own(joint: str, **values: float) -> Plant:
-    """What the joint does by itself, see `scene.Joint`."""
-    return of_robot(lambda robot: scenes.with_joint(robot, joint, **values))
+    """Other values of a joint, see `scene.Joint`."""
+    return of_robot(lambda robot: robot.with_joints(joint, **values))
 
 
 def edited(path: str, edit: Edit) -> Plant:
     """An element of the URDF, edited; the meshes come along."""
 
     def plant(scene: Scene) -> Scene:
-        robot = scenes.of_scene(scene)
+        robot = scene.arm
         root = ET.parse(keep(**content_of(robot))).getroot()
         element = root.find(path)
         if element is None:
@@ -229,7 +220,8 @@ def _text(values: FloatArray) -> str:
 def robot_faults(robot: Robot) -> dict[str, Fault]:
     """Faults of the middle joint of an arm, of the link that it moves, of the base and the
     fingers."""
-    first, middle = robot.arm_joints[0].name, robot.arm_joints[len(robot.arm_joints) // 2].name
+    first, driven = robot.arm_joints[0].name, robot.arm_joints[len(robot.arm_joints) // 2]
+    middle, farther = driven.name, driven.initial_position + 0.01
     children = {joint.name: joint.child for joint in PreparedRobot(robot).joints}
     moved, fingers = children[middle], robot.gripper.joints
     joint, link = f"joint[@name='{middle}']", f"link[@name='{moved}']"
@@ -270,7 +262,7 @@ def robot_faults(robot: Robot) -> dict[str, Fault]:
         "link_gravity": (f"{moved} feels half of gravity", f"{of_link}/gravity",
                          with_own(middle, gravity=0.5), None, "link_gravity"),
         "initial_position": (f"{middle} starts 10 mrad farther", f"{drive}/initial_position",
-                             of_joints(middle, farther=0.01)),
+                             with_own(middle, initial_position=farther)),
     }  # fmt: skip
     if fingers:
         twice = of_joints(*fingers, effort_limit=2.0)

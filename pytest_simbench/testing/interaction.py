@@ -29,7 +29,7 @@ def squeeze_bounds_the_grip(subject: Subject) -> None:
     """Two fingers that press with F carry 2 mu F and no more: of what they can carry, a cube of
     0.6 times that weight stays (15 mm in 0.5 s), one of 1.3 times falls out (50 mm)."""
     force = 5.0
-    robot = scenes.squeezing(subject.arm, force)
+    robot = subject.arm.squeezing(force)
     moved = []
     for share in (0.6, 1.3):
         mass = share * 2 * robot.friction * force / GRAVITY
@@ -105,7 +105,7 @@ def held_weight_is_felt(subject: Subject) -> None:
     joint = int(np.argmax(cube_load * np.sign(arm_load)))
     limit = float(abs(arm_load[joint]) + abs(cube_load[joint]) / 2)
     name = robot.joints[joint].name
-    weak = scenes.with_joint(robot, name, effort_limit=limit)
+    weak = robot.with_joints(name, effort_limit=limit)
     held = scenes.grip(weak, mass, name="heavy grip")
     sags = []
     for scene in (replace(held, name="empty grip", bodies=()), held):
@@ -158,7 +158,7 @@ def pulled_grip_slips(subject: Subject) -> None:
     where on them they press. Pulled with 1.25 of it the cube goes by more than an edge in 0.3 s. A
     hand that is glued to what it holds does not let it go."""
     force = 5.0
-    robot = scenes.squeezing(subject.arm, force)
+    robot = subject.arm.squeezing(force)
     scene = replace(scenes.grip(robot, name="pulled grip"), gravity=(0.0, 0.0, 0.0))
     along = RobotModel(robot).tool_pose(robot.column("initial_position")).rotation()[:, 2]
     ends = np.array([_GRASP, _GRASP + 0.3, _GRASP + 0.6])
@@ -230,7 +230,7 @@ def thrown_cube_flies_free(subject: Subject) -> None:
     start, goal = (np.array(rows) for rows in subject.arm.swing or ())
     robot = subject.arm
     for joint, value in zip(robot.arm_joints, start, strict=True):
-        robot = scenes.with_joint(robot, joint.name, initial_position=float(value))
+        robot = robot.with_joints(joint.name, initial_position=float(value))
     scene = scenes.grip(robot, name="throw")
     with subject.world(scene) as world:
         world.follow(close_command(scene, subject.timestep))
