@@ -94,7 +94,7 @@ class Arm:
             self.grasp = grasp_of(robot, CUBE_SIZE * scale, scale)
             self.planning = PlanningScene(self.model, world.scene, scale)
             self.planner = MotionPlanner(self.model, self.planning, rng, world.scene.gravity)
-        self.home = self.arm = robot.column("initial_position")[: self.model.arm]
+        self.home = self.arm = self.model.home
         self.fingers = self.gripper.opened
         self.held: str | None = None
         self._released: tuple[str, ...] = ()

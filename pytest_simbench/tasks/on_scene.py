@@ -28,7 +28,6 @@ class OnScene(Task):
         world: the scene, of a file (`scene_file`) or made by hand.
     """
 
-    study_timeout: ClassVar[float] = 600.0
     shares_worker: ClassVar[bool] = True
 
     world: Scene
