@@ -10,7 +10,6 @@ import numpy as np
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.laws.free import rotation_of
 from pytest_simbench.laws.hands import close_command, gravity_effort, hold_command
-from pytest_simbench.laws.impact import DeadLanding
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene, Wrench
 from pytest_simbench.tasks.manipulator import Manipulator
@@ -18,7 +17,7 @@ from pytest_simbench.tasks.throw_analysis import Thrown
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import any_robot, check, grasping, throwing
 from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS, Approach, approaches, beside
-from pytest_simbench.testing.subject import Subject, asked, require, require_close
+from pytest_simbench.testing.subject import Subject, require, require_close
 
 _GRASP = 0.5
 """For how long the hand closes before anything is asked [s]."""
@@ -141,13 +140,6 @@ def _require_touch(subject: Subject, approach: Approach, places: FloatArray) -> 
     travelled = (places - approach.start) @ approach.direction
     what = f"way of a cube that flies upon {approach.link}"
     require_close(what, float(travelled.max()), approach.distance, allowed, "m")
-
-
-@check()
-def nothing_bounces(subject: Subject) -> None:
-    """A cube that falls flat upon the ground from 0.1 m rises again by at most a tenth of that
-    (restitution below 0.32)."""
-    asked(subject, DeadLanding(height=0.1), within=0.01)
 
 
 @check(robot=grasping)

@@ -41,4 +41,5 @@ class Moved(ScriptedProcess):
     def _joints(self) -> FloatArray:
         if self.until == math.inf:  # it was just loaded
             return super()._joints()
-        return self.end + [(self.time - self.until) * self.end[1], np.zeros(2)]
+        way = (self.time - self.until) * self.end[1]
+        return np.array([self.end[0] + way, self.end[1]])
