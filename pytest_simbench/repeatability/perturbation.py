@@ -98,7 +98,7 @@ class Perturbation:
         if self.quantity == "delay":
             return scene
         if self.quantity == "friction":
-            return _with_friction(scene, factor)
+            return scene.with_frictions(lambda mu: mu * factor)
         if self.quantity == "squeeze":
             squeeze = factor * scene.arm.gripper.squeeze
             return replace(scene, robot=scene.arm.squeezing(squeeze))
@@ -109,14 +109,6 @@ class Perturbation:
             turned = Pose.at(0, 0, 0, yaw=self.amount) * Pose(quaternion=body.pose.quaternion)
             return scene.with_pose(self.body, Pose(body.pose.position, turned.quaternion))
         return scene.with_pose(self.body, body.pose.translated(**{self.quantity: self.amount}))
-
-
-def _with_friction(scene: Scene, factor: float) -> Scene:
-    bodies = tuple(body.with_friction(body.friction * factor) for body in scene.bodies)
-    robot = scene.robot and replace(scene.robot, friction=scene.robot.friction * factor)
-    return replace(
-        scene, bodies=bodies, robot=robot, ground_friction=scene.ground_friction * factor
-    )
 
 
 def perturbed(scene: Scene, perturbations: Sequence[Perturbation]) -> Scene:

@@ -284,23 +284,18 @@ class Robot(Wire):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise SceneError(f"robot {self.name!r} has several drives for {', '.join(twice)}")
-        unknown = [name for name in self.gripper.joints if name not in names]
-        if unknown:
-            raise SceneError(
-                f"the gripper of {self.name!r} has the joints {', '.join(unknown)}, which have no "
-                f"drives; choose from {', '.join(names)}"
-            )
+        coupled = [name for c in self.couplings for name in (c.follower, c.leader)]
+        for what, joints in (("the gripper", self.gripper.joints), ("a coupling", coupled)):
+            if unknown := sorted({*joints} - {*names}):
+                raise SceneError(
+                    f"{what} of {self.name!r} has the joints {', '.join(unknown)}, which have no "
+                    f"drives; choose from {', '.join(names)}"
+                )
         last = names[len(names) - len(self.beside) :]
         if self.beside != last or set(self.beside) & set(self.gripper.joints):
             raise SceneError(
                 f"the joints {', '.join(self.beside)} beside robot {self.name!r} are not its last, "
                 f"which are {', '.join(last)}; put them last, after the gripper's"
-            )
-        coupled = [name for c in self.couplings for name in (c.follower, c.leader)]
-        if unknown := sorted({name for name in coupled if name not in names}):
-            raise SceneError(
-                f"a coupling of {self.name!r} names the joints {', '.join(unknown)}, which have no "
-                f"drives; choose from {', '.join(names)}"
             )
         if self.limits is not None and len(self.limits.velocity) != len(self.arm_joints):
             raise SceneError(

@@ -88,14 +88,9 @@ def true_scene() -> Scene:
         Compound("stool", _stool(), Pose.at(-0.5, -0.5, 0.5, yaw=0.4), 0.5,
                  moments=(1.0e-3, 1.2e-3, 1.1e-3), friction=0.7),
     )  # fmt: skip
-    return Scene(
-        "full",
-        tuple(body.with_friction(0.7) for body in bodies),
-        robot=replace(scenes.arm(), friction=0.7),
-        gravity=(0.3, -0.2, -3.7),
-        ground_friction=0.7,
-        ground_restitution=0.6,
-    )
+    pull = (0.3, -0.2, -3.7)
+    scene = Scene("full", bodies, scenes.arm(), gravity=pull, ground_restitution=0.6)
+    return scene.with_frictions(lambda mu: 0.7)
 
 
 def _stool(aside: float = 0.0) -> tuple[Box, Box]:
