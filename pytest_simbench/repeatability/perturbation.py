@@ -154,7 +154,7 @@ def perturbations(
     """
     from hypothesis import strategies as st
 
-    limits = {q.name: q.bound for q in QUANTITIES.values()} if bounds is None else dict(bounds)
+    limits = {q.name: q.bound for q in QUANTITIES.values()} if bounds is None else bounds
     for name in (name for name in limits if name not in QUANTITIES):
         raise ValueError(f"no quantity is named {name!r}; choose from {', '.join(QUANTITIES)}")
     there = {"cube": bool(scene.free_bodies), "scene": True, "robot": scene.robot is not None}
