@@ -42,4 +42,7 @@ def test_scene_with_finer_steps(repeat, scene_file, finer):
 @pytest.mark.reps(5)
 @pytest.mark.parametrize("moved", MILLIMETRES, ids=lambda moved: f"{moved:g}mm")
 def test_scene_with_moved_starts(repeat, scene_file, moved):
-    repeat(Settling(scene_file(), moved=moved / 1000))
+    task = Settling(scene_file(), moved=moved / 1000)
+    if not task.world.free_bodies and not task.movable:
+        pytest.skip("no start can be moved: loops or couplings hold all joints")
+    repeat(task)

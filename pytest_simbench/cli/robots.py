@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from pytest_simbench.cli.values import BadInput
+from pytest_simbench.description.carried import named
+from pytest_simbench.description.urdf_check import Description
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.motion.model import RobotModel
@@ -41,6 +43,18 @@ def _lines(robot: Robot) -> Iterator[str]:
         f"{robot.name}: {arm} arm joints, {hand if fingers else 'a hand that only touches'}, "
         f"base at ({x:g}, {y:g}, {z:g})"
     )
+    if resisting := _resisting(robot):
+        yield f"    not used of the URDF: damping and friction of {named(resisting)} (<dynamics>)"
     for task in (kind(robot=robot) for kind in (Stacking, Throwing, Pushing)):
         if problem := task.problem():
             yield f"    no {task.name}: {problem}"
+
+
+def _resisting(robot: Robot) -> list[str]:
+    """Joints of which the URDF says more than 0."""
+    return [
+        joint.get("name", "")
+        for joint in Description(robot.urdf, robot.packages).joints
+        for dynamics in joint.iter("dynamics")
+        if any(dynamics.get(key, "").strip("0. ") for key in ("damping", "friction"))
+    ]

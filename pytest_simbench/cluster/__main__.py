@@ -44,8 +44,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return int(asyncio.run(given.run(given)))
     except (SimulatorError, OSError, ValueError, RuntimeError, TimeoutError) as error:
-        print(f"ERROR: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"ERROR: {_reason(error)}", file=sys.stderr)
         return 1
+
+
+def _reason(error: BaseException) -> str:
+    """What began it: Dask's own errors say that something failed, and not why."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return " ".join(str(error).split())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -153,13 +160,21 @@ async def _node(given: argparse.Namespace) -> int:
                 print(f"{node}; {given.slots} at once; it serves {given.address}", flush=True)
                 await _either(nanny.finished, told)
         except (OSError, RuntimeError, TimeoutError, ValueError) as error:
-            reason = " ".join(f"{error.__cause__ or error}".split())
-            print(f"no head at {given.address} takes this node ({reason})", flush=True)
+            print(not_taken(given, error), flush=True)
         if not told.is_set():
             print(f"it tries again every {AGAIN:g} s", flush=True)
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(told.wait(), AGAIN)
     return 0
+
+
+def not_taken(given: argparse.Namespace, error: BaseException) -> str:
+    """That no head takes the node; why one refuses it stands in the log of Dask alone."""
+    reason = _reason(error)
+    told = f"no head at {given.address} takes this node ({reason})"
+    if reason.startswith("Worker failed to start"):
+        told += f"; if Dask says above that the name {given.name!r} is taken, give another --name"
+    return told
 
 
 def _told() -> asyncio.Event:

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import MISSING, dataclass, fields, replace
 from hashlib import blake2b
+from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
 
@@ -25,9 +26,9 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.tasks.base import ROBOT, Task
+from pytest_simbench.tasks.base import Task
 
-OF_THE_MACHINE = ("folder", "python", "spec", "environment", "display", "robot", "contended")
+OF_THE_MACHINE = ("folder", "python", "spec", "environment", "display", "contended")
 """Attributes of a case that the node finds by itself."""
 
 
@@ -97,54 +98,47 @@ class Job:
 
     Attributes:
         case: attributes of the case that hold everywhere.
-        task: as the test asks for it; its robot, if it has one, is in `task_robot`.
+        task: as the test asks for it.
         client: whose it is; others may repeat a test of the same name.
-        robot, task_robot: by content.
     """
 
     case: Mapping[str, Any]
     task: Task
     client: str = ""
-    robot: SentRobot | None = None
-    task_robot: SentRobot | None = None
 
     @classmethod
     def of(cls, experiment: Experiment, client: str = "") -> Job:
-        case, task = experiment.case, experiment.asked
+        case = experiment.case
         kept = {f.name: getattr(case, f.name) for f in fields(case) if f.name not in OF_THE_MACHINE}
-        own = getattr(task, ROBOT, None)
-        own = own if isinstance(own, Robot) else None
-        return cls(
-            kept,
-            replace(task, **{ROBOT: None}) if own else task,  # type: ignore[type-var]
-            client,
-            None if case.robot is None else SentRobot.of(case.robot),
-            None if own is None else SentRobot.of(own),
-        )
+        return cls(kept, experiment.asked, client)
 
     def experiment(self, folder: Path, **more: Any) -> Experiment:
-        """On this machine, with a folder for logs and traces.
-
-        Raises:
-            OSError: the robot's files cannot be kept here.
-        """
+        """On this machine, with a folder for logs and traces."""
         info = adapter(self.case["simulator"]).info
         case = Case(
             **self.case,
             folder=folder,
             python=interpreter(info),
             environment=Environment.of(info).variables(),
-            robot=None if self.robot is None else self.robot.here(),
             **more,
         )
-        own = self.task_robot
-        task = self.task if own is None else replace(self.task, **{ROBOT: own.here()})  # type: ignore[type-var]
-        return Experiment(case, task)
+        return Experiment(case, self.task)
 
     def pack(self) -> Packed:
         """For the way to a node. The task's class, its policy and their bases travel as code, where
-        their modules are the tests' own; what else these import must be there on the node."""
+        their modules are the tests' own; what else these import must be there on the node. Robots
+        travel by content, wherever they stand: in the case, in the task, in a scene of the task.
+
+        Raises:
+            DescriptionError: a file of a robot is missing or wrong.
+        """
         import cloudpickle
+
+        class Pickler(cloudpickle.Pickler):  # type: ignore[misc]
+            def reducer_override(self, obj: Any) -> Any:
+                if isinstance(obj, Robot) and obj.urdf:
+                    return SentRobot.here, (SentRobot.of(obj),)
+                return super().reducer_override(obj)
 
         with _packing, ExitStack() as stack:
             policy = getattr(self.task, "policy", None)
@@ -155,11 +149,17 @@ class Job:
                 if module is not None and not _installed(name, getattr(module, "__file__", None)):
                     cloudpickle.register_pickle_by_value(module)
                     stack.callback(cloudpickle.unregister_pickle_by_value, module)
-            return Packed.of(cloudpickle.dumps(self))
+            written = BytesIO()
+            Pickler(written).dump(self)
+            return Packed.of(written.getvalue())
 
     @classmethod
     def unpack(cls, data: bytes) -> Job:
-        """On the node. It runs code of the client's."""
+        """On the node. It runs code of the client's.
+
+        Raises:
+            OSError: a robot's files cannot be kept here.
+        """
         import cloudpickle
 
         return cast("Job", cloudpickle.loads(data))

@@ -18,8 +18,8 @@ LARGEST_MESH = 16 * 2**20
 MOST_TRIANGLES = 200_000
 """The least that an engine takes of an STL (docs/decisions.md)."""
 
-FARTHEST = 1e6
-"""No vertex is farther from its origin, in the file's unit."""
+FARTHEST = 50.0
+"""No vertex is farther from its origin [m]: a link in millimetres would be."""
 
 THINNEST = 1e-6
 """Extent in the shortest direction over that in the longest."""
@@ -101,7 +101,10 @@ def check_mesh(path: Path) -> None:
         raise FileError(f"{path} has {count} triangles; simplify it to {MOST_TRIANGLES} or fewer")
     points = triangles.reshape(-1, 3)
     if not (np.abs(points) <= FARTHEST).all():  # false for NaN
-        raise FileError(f"{path} has a vertex that is not finite, or more than {FARTHEST:g} away")
+        raise FileError(
+            f"{path} has a vertex that is not finite, or more than {FARTHEST:g} m away; if it is "
+            "in millimetres, scale it to metres"
+        )
     spread = np.linalg.eigvalsh(np.cov(points.T))
     if not spread[0] > THINNEST**2 * spread[2]:
         raise FileError(f"{path} is flat: it has no convex hull, which is what engines collide")

@@ -65,6 +65,12 @@ class Description:
             change(xml)
         if xml.tag != "robot":
             raise DescriptionError(f"{path} is no URDF: it holds <{xml.tag}>, not <robot>")
+        for element in xml.iter():
+            if element.tag.startswith("xacro:"):
+                raise DescriptionError(
+                    f"{path}, line {self._lines.get(element, 0)}: <{element.tag}> is of xacro, "
+                    "which nothing here expands; do that first (xacro FILE > NAME.urdf)"
+                )
         self.links = self._named(xml.findall("link"))
         self.joints = list(self._named(xml.findall("joint")).values())
         if not 0 < len(self.links) <= MOST_LINKS:

@@ -21,7 +21,7 @@ from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.scene import Coupling, Gripper, Joint, Polytope, Pose, Robot, Scene, SceneError
 from pytest_simbench.scene.robot import FASTEST, FREE, WIDEST
 
-ABOVE = 3
+ABOVE = 4
 """So many folders, its own the first, are looked through for the packages that a URDF names."""
 
 READ = {

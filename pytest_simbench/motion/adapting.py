@@ -69,12 +69,13 @@ def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
     """Make joints that move, by name, fixed ones, where they stand at some position [rad] or [m].
 
     Raises:
-        DescriptionError: a number of such a joint cannot be read.
+        DescriptionError: a number of such a joint cannot be read, or it cannot stand there.
     """
     for joint in robot.findall("joint"):
         if joint.get("name") not in positions or joint.get("type") not in MOVING:
             continue
         axis, position = _numbers(joint, "axis", "xyz", "1 0 0"), positions[joint.get("name", "")]
+        _check_within(joint, position)
         origin = pose_of_rpy(*(_numbers(joint, "origin", key, "0 0 0") for key in ("xyz", "rpy")))
         moved = joint_motion(joint.get("type", ""), axis, position)
         for tag in ("origin", "mimic"):
@@ -82,6 +83,23 @@ def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
                 joint.remove(element)
         joint.set("type", FIXED)
         write_origin(joint, origin * moved)
+
+
+def _check_within(joint: ET.Element, position: float) -> None:
+    """Refuse a position out of the joint's limits."""
+    limit = joint.find("limit")
+    ends = ("-inf", "inf") if limit is None else (limit.get("lower", ""), limit.get("upper", ""))
+    try:
+        lower, upper = map(float, ends)
+    except ValueError:
+        raise DescriptionError(
+            f"joint {joint.get('name')!r} has the limits {ends}; give 2 numbers"
+        ) from None
+    if not lower <= position <= upper:
+        raise DescriptionError(
+            f"joint {joint.get('name')!r} is locked at {position:g}, and its URDF lets it go from "
+            f"{lower:g} to {upper:g} rad or m"
+        )
 
 
 def _fixed(name: str, parent: str, child: str, pose: Pose) -> ET.Element:

@@ -98,6 +98,8 @@ class _Reader:
         self._locked, self._changed = table.every("locked", FileTable.number), False
         description = Description(self.urdf, self.packages, self._adapt)
         self.moving = _moving(description.joints)
+        moving = [j for j in description.joints if j.get("name", "") in self.moving]
+        self._mimics = {j.get("name", ""): mimic for j in moving for mimic in j.iter("mimic")}
         corners = table.number("hull_corners", 0.0, least=0.0)
         if corners and (corners < FEWEST_CORNERS or corners != int(corners)):
             raise table.error("hull_corners", f"give a whole number of at least {FEWEST_CORNERS}")
@@ -116,6 +118,7 @@ class _Reader:
         measured, limits = "levers" in arm, self._limits(arm, names)
         arm.close()
         hand = self._hand()
+        self._check_mimics(hand.gripper.joints)
         swing = self._swing(len(names)) if "throw" in table else None
         position, yaw = table.each("base", 3, 0.0), table.number("yaw", 0.0)
         stand = Pose.at(*table.each("stand", 3), yaw=yaw) if "stand" in table else None
@@ -185,6 +188,18 @@ class _Reader:
         return tuple(
             Joint(*values) for values in zip(names, *columns, effort, armature, start, strict=True)
         )
+
+    def _check_mimics(self, fingers: Collection[str]) -> None:
+        """Fingers alone follow each other, and move alike."""
+        for name, mimic in self._mimics.items():
+            leader, told = mimic.get("joint", ""), (mimic.get("multiplier"), mimic.get("offset"))
+            alike = tuple(map(float, (told[0] or 1, told[1] or 0))) == (1.0, 0.0)
+            if not (alike and {name, leader} <= set(fingers)):
+                raise DescriptionError(
+                    f"joint {name!r} follows {leader!r} (<mimic>), and here each joint of an arm "
+                    "moves by itself, and fingers move alike, with multiplier 1 and offset 0; "
+                    "leave <mimic> out, turn the finger's axis, or put the joint under [locked]"
+                )
 
     def _of_urdf(self, key: str, names: Sequence[str]) -> list[float]:
         """The URDF's limits of effort or velocity."""

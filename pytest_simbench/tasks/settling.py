@@ -13,7 +13,7 @@ from pytest_simbench.client.world import World
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.scene import Body, FloatArray, Pose, Scene, SceneError
+from pytest_simbench.scene import Body, FloatArray, Pose, Scene, SceneError, Start
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
@@ -58,7 +58,9 @@ class Settling(OnScene):
             `starts`, if it has some.
         premises: what should be true at the end.
         seconds: simulated time [s].
-        moved: each free body starts elsewhere by at most this in x and in y, by chance [m].
+        moved: each free body starts elsewhere by at most this in x and in y, by chance [m]; so does
+            each slider in its range, and each hinge by so many rad: what is 1 m from its axis moves
+            as far.
     """
 
     name: ClassVar[str] = "settling"
@@ -118,7 +120,24 @@ class Settling(OnScene):
             for body in scene.free_bodies:
                 x, y = rng.uniform(-self.moved, self.moved, 2)
                 scene = scene.with_pose(body.name, body.pose.translated(float(x), float(y)))
+            if scene.robot is not None:
+                limits, positions = PreparedRobot(scene.robot).limits, []
+                for joint in scene.robot.joints:
+                    way = rng.uniform(-self.moved, self.moved) * (joint.name in self.movable)
+                    ends = limits[joint.name]
+                    positions.append(float(np.clip(joint.initial_position + way, *ends)))
+                scene = scene.at_start(Start((), (), tuple(positions)))
         return scene
+
+    @property
+    def movable(self) -> frozenset[str]:
+        """Joints that may start elsewhere: neither a loop nor a coupling holds them."""
+        robot = self.world.robot
+        if robot is None or robot.closures:
+            return frozenset()
+        pairs = (*robot.couplings, *robot.gripper.couplings)
+        held = {name for pair in pairs for name in (pair.follower, pair.leader)}
+        return frozenset(robot.joint_names) - held
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         scene = world.scene

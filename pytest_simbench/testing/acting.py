@@ -60,7 +60,8 @@ def _told(subject: Subject, scene: Scene, loads: dict[tuple[str, str], float]) -
         require(pair in told, f"no contact of {pair[0]} with {pair[1]}; there are {sorted(told)}")
         limit = 0.02 * abs(load) * GRAVITY
         off = float(np.abs(told[pair][:3] + load * np.asarray(scene.gravity)).max())
-        require_close(f"error of {pair[1]}'s force on {pair[0]}", off, 0.0, limit, "N")
+        what = f"error of {pair[1]}'s force on {pair[0]}, told as {told[pair][:3].round(4)},"
+        require_close(what, off, 0.0, limit, "N")
         force, torque = np.hsplit(sum(told[two] for two in told if two[0] == pair[0]), 2)
         place = np.asarray(places[pair[0].partition("/")[2]].position)
         about = float(np.abs(torque - np.cross(place, force)).max())

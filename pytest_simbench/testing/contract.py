@@ -179,7 +179,9 @@ def velocity_frames(subject: Subject) -> None:
         mean = (a[10:] + b[10:]) / 2
         turned = float(np.linalg.norm(omega - mean))
         limit = 0.05 * float(np.linalg.norm(mean)) + float(np.linalg.norm(b[10:] - a[10:]))
-        require_close("angular velocity's error", turned, 0.0, limit, "rad/s")
+        require_close(
+            "error of the angular velocity, in the world's axes,", turned, 0.0, limit, "rad/s"
+        )
 
 
 @check()

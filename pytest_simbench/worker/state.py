@@ -201,11 +201,11 @@ def check_following(simulator: Simulator, scene: Scene, joints: FloatArray, goal
 
 
 def _checked(title: str, values: Any, shape: tuple[int, ...]) -> FloatArray:
-    """The array, if it is one of float64 of this shape."""
+    """A copy of the array, which may be the engine's own, if it is one of float64 of this shape."""
     came = f"a {type(values).__name__}"
     if isinstance(values, np.ndarray):
         if values.dtype == np.float64 and values.shape == shape:
-            return values
+            return values.copy()
         came = f"{values.dtype} {values.shape}"
     raise StateError(f"{title} must be an array of float64 {shape}, not {came}")
 

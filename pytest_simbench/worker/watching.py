@@ -95,7 +95,7 @@ class Watch:
         self._glimpse, self._ends = max(1, round(GLIMPSE / self._step)), NEVER
         self.seconds = 0.0
         self._last = self._start = _Look(
-            0, simulator.time, simulator.joint_state(), np.array(simulator.body_state())
+            0, simulator.time, np.array(simulator.joint_state()), np.array(simulator.body_state())
         )
         self._names = [body.name for body in scene.free_bodies]
         self._joints = () if scene.robot is None else scene.robot.joint_names

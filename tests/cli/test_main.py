@@ -17,7 +17,7 @@ from pytest_simbench.cli.main import COMMANDS
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.simulator.registry import adapter, registered
 from tests.cli.command import said
-from tests.motion.small_arm import small_arm
+from tests.motion.small_arm import URDF, small_arm
 
 NAMES = [command.name for command in COMMANDS]
 
@@ -169,6 +169,9 @@ def test_robots_and_their_files(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     )
     for line, pattern in zip(out.splitlines(), lines, strict=True):
         assert fnmatchcase(line, pattern)
+    oiled = URDF.replace("</joint>", '<dynamics damping="5" friction="0.0"/></joint>', 2)
+    out = said(capsys, "robots", str(small_arm(tmp_path, urdf=oiled)))[1]
+    assert "    not used of the URDF: damping and friction of turn, lift (<dynamics>)\n" in out
 
 
 def test_environments_come_and_go(

@@ -19,8 +19,10 @@ from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import describe_robot, expected
 from pytest_simbench.experiment.policy_file import read_policies
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
-from pytest_simbench.tasks import Holding, Reaching, Stacking
+from pytest_simbench.scene import Scene
+from pytest_simbench.tasks import Holding, Reaching, Settling, Stacking
 from tests.cluster.test_pool import A, Told
 from tests.tasks.scripted_scene import SCENE
 from tests.tiny import Falling
@@ -86,11 +88,10 @@ def test_a_robot_travels_by_content(
 ) -> None:
     robot = find("xarm7")
     experiment = Experiment(replace(case, robot=robot), Stacking())
-    job = Job.unpack(Job.of(experiment).pack().data or b"")
+    data = Job.of(experiment).pack().data or b""
+    assert robot.urdf.encode() not in data
     monkeypatch.setattr("pytest_simbench.description.robot_files.folder", lambda: tmp_path)
-    assert job.robot is not None
-    assert str(robot.urdf) not in str(job.robot.robot)
-    there = job.experiment(tmp_path)
+    there = Job.unpack(data).experiment(tmp_path)
     assert there.robot is not None
     assert Path(there.robot.urdf).parent == tmp_path
     assert Path(there.robot.srdf).parent == tmp_path
@@ -98,6 +99,20 @@ def test_a_robot_travels_by_content(
     assert there.problem() is None
     own = Job.unpack(Job.of(Experiment(case, Stacking(robot=robot))).pack().data or b"")
     assert describe_robot(own.experiment(tmp_path).task.robot) == describe_robot(robot)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("task", [Settling, Holding])
+def test_so_does_that_of_a_task_s_scene(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, task: type[Settling | Holding]
+) -> None:
+    """A file's joints are one: the node has neither the file nor what was made of it."""
+    robot = panda()
+    data = Job.of(Experiment(case, task(Scene("arm", (), robot)))).pack().data or b""
+    assert robot.urdf.encode() not in data
+    monkeypatch.setattr("pytest_simbench.description.robot_files.folder", lambda: tmp_path)
+    there = Job.unpack(data).task.world.robot  # type: ignore[attr-defined]
+    assert Path(there.urdf).parent == tmp_path
+    assert describe_robot(there) == describe_robot(robot)
 
 
 def test_it_is_packed_once_for_all_repetitions(case: Case) -> None:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import socket
+import subprocess
+import sys
 import threading
+from argparse import Namespace
 from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 
 from pytest_simbench.cluster import pool as module
+from pytest_simbench.cluster.__main__ import not_taken
 from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node, here, refusal, unmet
 from pytest_simbench.cluster.pool import Pool
 from pytest_simbench.simulator.registry import adapter
@@ -142,3 +147,21 @@ def test_waiting_ends_when_the_run_does() -> None:
     pool, stop = Told([]), threading.Event()
     threading.Timer(0.3, stop.set).start()
     assert pool.reserve(lambda node: True, (), stop) is None
+
+
+def test_a_head_whose_port_is_taken_says_so() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        command = [sys.executable, "-m", "pytest_simbench.cluster", "head", "--port", port]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert ended.returncode == 1
+    assert "already in use" in ended.stderr
+
+
+def test_a_node_whose_name_is_taken_is_told_to_take_another() -> None:
+    error = RuntimeError("Nanny failed to start.")
+    error.__cause__ = RuntimeError("Worker failed to start.")
+    told = not_taken(Namespace(address="tcp://head:8786", name="vm"), error)
+    assert told.endswith("that the name 'vm' is taken, give another --name")
+    away = not_taken(Namespace(address="tcp://head:8786", name="vm"), OSError("Timed out"))
+    assert away == "no head at tcp://head:8786 takes this node (Timed out)"

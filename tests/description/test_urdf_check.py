@@ -176,6 +176,7 @@ INERTIA = 'ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"'
         ("meshes/hand.stl", "meshes/short.stl", "holds no binary STL mesh"),
         ("meshes/hand.stl", "meshes/nan.stl", "has a vertex that is not finite"),
         ("meshes/hand.stl", "meshes/far.stl", "has a vertex that is not finite, or more than"),
+        ("meshes/hand.stl", "meshes/mm.stl", "50 m away; if it is in millimetres, scale it"),
         ('type="revolute"', 'type="continuous"', "is continuous, which no task can drive"),
         ('type="revolute"', 'type="floating"', "is floating"),
         ('type="revolute"', 'type="magic"', "has the type 'magic'; choose from revolute, prism"),
@@ -215,6 +216,7 @@ INERTIA = 'ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"'
          "has a document type (<!DOCTYPE>), which may define entities; leave it out"),
         ("<robot ", '<!DOCTYPE robot [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;">'
          '<!ENTITY c "&b;&b;&b;&b;&b;">]><robot ', "<!DOCTYPE>"),
+        ("</robot>", "<xacro:arm parent='tip'/></robot>", "<xacro:arm> is of xacro, which nothing"),
         ("</robot>", "", "is not valid XML"),
         ("</robot>", "</robot>garbage", "is not valid XML"),
         ("</robot>", "&undefined;</robot>", "is not valid XML: undefined entity"),
@@ -236,6 +238,7 @@ def test_a_broken_file(robot: Robot, old: str, new: str, said: str) -> None:
     (meshes / "short.stl").write_bytes(stl()[:-1])
     (meshes / "nan.stl").write_bytes(stl(np.nan))
     (meshes / "far.stl").write_bytes(stl(1e9))
+    (meshes / "mm.stl").write_bytes(stl(100.0))
     if said:
         expected = said.split("|")[0]
         if new == '<child link="foot"/>':  # the root gets a parent, the tip has none

@@ -162,6 +162,9 @@ def test_packages_are_folders_above_the_file_or_beside_one(tmp_path: Path) -> No
         (tmp_path / package / "meshes" / "knob.stl").write_bytes(stl)
         mesh = f'<mesh filename="package://{package}/meshes/knob.stl"/>'
         assert read(folder, ('<sphere radius=".05"/>', mesh)).scene.file_lift == pytest.approx(0.7)
+    deep = tmp_path / "shop" / "robots" / "one" / "urdf"
+    deep.mkdir(parents=True)
+    read(deep, ('<sphere radius=".05"/>', '<mesh filename="package://shop/meshes/knob.stl"/>'))
     with pytest.raises(DescriptionError, match="unknown package 'other'"):
         read(folder, ('<sphere radius=".05"/>', '<mesh filename="package://other/knob.stl"/>'))
 

@@ -282,6 +282,11 @@ IN_TOML = {
     "a joint of the arm that is locked": (
         more("[locked]\nbend = 0.1"), r"joints: 'bend' is no moving joint of the URDF; it has"
     ),
+    "locked out of the limits": (
+        lambda text: swap('["left_finger", "right_finger"]', '["left_finger"]')(text)
+        + "[locked]\nright_finger = 5.0\n",
+        r"joint 'right_finger' is locked at 5, and its URDF lets it go from 0 to 0\.05 rad or m",
+    ),
     "locked at no number": (more("[locked]\nbend = nan"), r"\[locked\]: bend: nan is no number of"),
     "a tool beside no link": (
         lambda text: swap('"grip"', '"grab"')(text) + "xyz = [0.0, 0.0, 0.0]\n",
@@ -311,6 +316,17 @@ IN_TOML = {
 IN_URDF = {
     "not XML": (swap("</robot>", ""), r"small\.toml: .*small\.urdf is not valid XML"),
     "no limit of effort": (swap('effort="80"', ""), r"effort: 0.0 is no number of at least 1e-06"),
+    "a joint of the arm that follows": (
+        swap('child link="lower"/>', 'child link="lower"/><mimic joint="lift"/>'),
+        r"joint 'bend' follows 'lift' \(<mimic>\), and here each joint of an arm moves by itself",
+    ),
+    "a finger that moves the other way": (
+        swap(
+            'child link="right"/>',
+            'child link="right"/><mimic joint="left_finger" multiplier="-1"/>',
+        ),
+        r"joint 'right_finger' follows 'left_finger' .* turn the finger's axis",
+    ),
     "a mimic loop": (
         lambda text: text.replace("</joint>", LOOP.replace("right", "left"), 5).replace(
             '<mimic joint="left_finger"/>', "", 3

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Compound, Pose, Scene, SceneError, Start
 from pytest_simbench.tasks import Jitter, Settling, rests_on
 from pytest_simbench.tasks.resting import spread
@@ -51,6 +52,21 @@ def test_starts_are_moved_on_request_alone_and_by_the_seed() -> None:
         way = np.subtract(body.pose.position, SCENE.body(body.name).pose.position)
         assert 0 < np.abs(way[:2]).max() <= 0.001
         assert way[2] == 0
+
+
+def test_joints_start_elsewhere_too_but_for_coupled_ones_and_within_their_ranges() -> None:
+    scene = Scene("arm", (), panda())
+    assert scene.robot is not None
+    lowest = replace(scene.robot.joints[0], initial_position=-2.8973)  # the end of its range
+    robot = replace(scene.robot, joints=(lowest, *scene.robot.joints[1:]))
+    was = robot.column("initial_position")
+    task = Settling(replace(scene, robot=robot), moved=0.001)
+    starts = [task.scene(seed, NONE).robot for seed in range(9)]
+    ways = [start.column("initial_position") - was for start in starts if start is not None]
+    assert (np.abs(ways) <= 0.001).all()
+    assert (np.array(ways)[:, 1:7] != 0).all()
+    assert (np.array(ways)[:, 7:] == 0).all()  # one finger follows the other
+    assert 0 == np.min(ways, axis=0)[0] < np.max(ways, axis=0)[0]
 
 
 def test_repetitions_go_through_starts_which_are_in_the_file_s_frames() -> None:

@@ -204,6 +204,19 @@ def test_log_at_its_period() -> None:
     assert stepper.wait(0.01, None) == {}
 
 
+def test_a_log_keeps_what_was_even_where_an_adapter_gives_one_array_again_and_again() -> None:
+    class Reusing(Toy):
+        def step(self) -> None:
+            super().step()
+            self.bodies[0, 2] = self.joints[0, 0] = self.time
+
+    toy = Reusing()
+    toy.joints = np.zeros((2, 9))
+    log = stepping(toy, robot=panda()).wait(0.1, 0.02)
+    assert np.allclose(log["bodies"][:, 0, 2], log["time"])
+    assert np.allclose(log["joints"][:, 0, 0], log["time"])
+
+
 def test_a_motion_shorter_than_the_period_has_no_log() -> None:
     """None at all: arrays of no samples would not have a sample's shape."""
     stepper = stepping(Toy())
