@@ -17,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 from common import arguments, write_run
@@ -25,7 +25,8 @@ from common import arguments, write_run
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.measure.limits import parse_limits
 from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.report.files import write_report
+from pytest_simbench.report.files import write_files
+from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.page import PAGE_NAME
 
 LARGEST, LONGEST, OPENED = 8.0, 2.0, 5
@@ -37,10 +38,9 @@ def measure(folder: Path) -> dict[str, float]:
     times = [time.process_time()]
     reading = RunFolder(folder).read()
     times.append(time.process_time())
-    write_report(RunFolder(folder), reading)
+    write_files(folder, Report.of(reading))
     times.append(time.process_time())
-    metrics = [metric for task in reading.metrics.values() for metric in task]
-    limits = parse_limits("placed:5%,ram:10%,rtf:20%", metrics)
+    limits = parse_limits("placed:5%,ram:10%,rtf:20%", chain(*reading.metrics.values()))
     run_gate(reading.records, reading.records, limits, reading.metrics)
     times.append(time.process_time())
     parts = [end - begin for begin, end in pairwise(times)]

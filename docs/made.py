@@ -32,7 +32,8 @@ from published_runs import PUBLISHED
 from tables import DATA, DOCS, table
 
 from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.report.markdown.capabilities import all_capabilities
+from pytest_simbench.report.markdown.run import table as markdown
+from pytest_simbench.report.model.capabilities import columns
 
 README = DOCS.parent / "README.md"
 MARK = re.compile(r"<!-- made: ([\w ]+) -->\n(?:(?:(?!<!-- made:).)*?<!-- end -->\n?)?", re.S)
@@ -64,7 +65,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "commands": make_options.commands,
     "marks": make_options.marks,
     "fixtures": make_options.fixture_table,
-    "capabilities": all_capabilities,
+    "capabilities": lambda: markdown(columns()),
     "known_failures": make_options.known_failures,
 }
 """By the first word of a mark, the others are arguments; beside those of `make_results`."""
@@ -126,13 +127,12 @@ def read(folders: Sequence[str], **published: str) -> None:
         run = RunFolder(Path(folder)).read()
         if make_claims.read(run):
             continue
-        records = run.records
-        make_transfer.read(records)
-        laws = make_truth.SWEEP if any(r.swept for r in records) else make_truth.TRUTH
+        make_transfer.read(run.records)
+        laws = make_truth.SWEEP if any(r.swept for r in run.records) else make_truth.TRUTH
         for kept in (laws, make_contact.CONTACT, *make_tasks.KEPT):
-            kept.read(records)
+            kept.read(run.records)
         for kept in PUBLISHED.values() if published else ():
-            kept.read(records, **published)
+            kept.read(run.records, **published)
 
 
 def main(arguments: list[str]) -> None:

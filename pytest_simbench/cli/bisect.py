@@ -22,14 +22,8 @@ from pytest_simbench.cli.bisect_ends import bisect_ends
 from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput, Span
 from pytest_simbench.client import package_index
-from pytest_simbench.measure.bisection import (
-    between,
-    difference,
-    first_worse,
-    has_value,
-    like_the_bad_one,
-    steps,
-)
+from pytest_simbench.measure.bisection import between, first_worse, like_the_bad_one, steps
+from pytest_simbench.measure.speed import compared
 from pytest_simbench.simulator.registry import adapter
 
 ENDS = "ends"
@@ -57,9 +51,9 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
     metric = search.metric()
     good, bad = search.result(0), search.result(last)
     for end, place in ((good, 0), (bad, last)):
-        if not has_value(metric, end):
+        if not end.values(metric):
             raise BadInput(f"{search.describe(place)}, so nothing tells worse")
-    found = difference(metric, good, bad)
+    found, _ = compared(metric, good, bad)
     if not found.significant():
         print(
             f"{search.describe(0)}, {search.describe(last)}: these repetitions do not show that it "
@@ -76,8 +70,8 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
 
     place = first_worse(len(releases), is_worse)
     sides = search.result(place - 1), search.result(place)
-    known = all(has_value(metric, side) for side in sides)
-    sure = f" (p = {difference(metric, *sides).p_value:.2g})" if known else ""
+    known = all(side.values(metric) for side in sides)
+    sure = f" (p = {compared(metric, *sides)[0].p_value:.2g})" if known else ""
     print(
         f"the first worse release is {releases[place]}: {search.describe(place - 1)}, "
         f"{search.describe(place)}{sure}"

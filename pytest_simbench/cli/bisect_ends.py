@@ -6,8 +6,9 @@ from __future__ import annotations
 from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.measure.bisection import first_worse
-from pytest_simbench.measure.settling import ALIKE, Settled, Who, settlings
+from pytest_simbench.measure.settling import ALIKE, Settled, settlings
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.record import Who
 from pytest_simbench.report.model.settling import sentences
 
 

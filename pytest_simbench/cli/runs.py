@@ -11,7 +11,8 @@ import os
 import shutil
 import stat
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,7 +31,6 @@ from pytest_simbench.report.files import (
     write_badge,
     write_files,
     write_outcome,
-    write_report,
     write_tables,
 )
 from pytest_simbench.report.model import sweep, transfer
@@ -40,8 +40,8 @@ from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.replay.recorded import FOLDER, write_bags
 from pytest_simbench.report.terminal.parts import (
     claim_lines,
-    history_lines,
     render_changes,
+    render_histories,
     render_tables,
     sweep_lines,
 )
@@ -112,34 +112,28 @@ def merge_runs(
         runs: their folders.
         output: folder to write to; None for a new one.
         verbose: whether whole tables are printed.
-        more: see `_extras`.
+        more: see `_show`.
 
     Raises:
         BadInput: a run that cannot be read, runs that are not parts of one, or a folder that
             already holds a run or cannot be written to.
     """
     folders, readings = _read(runs)
-    records, reading = _merged(readings)
-    folder = _locked(output)
-    try:
-        for task in reading.tasks.values():
+    records, merged = _merged(readings)
+    with closing(_locked(output)) as folder:
+        for task in merged.tasks.values():
             folder.describe(task)
         refused = _copy(records, folders, folder)
         unsaved = folder.flush()
-        outcome, wrong = _outcome(folders)
-        written = write_report(folder, looks=outcome.looks)
-        problems = [*_problems(readings), *refused, *unsaved, *written.problems, *wrong]
-        ended = RunOutcome(outcome.passed, looks=outcome.looks)
-        problems.append(write_outcome(folder.path, ended))
-        problems += [f"pytest --sim-resume={folder.path} judges the claims of the whole"] * any(
-            found.claims for found in readings.values()
-        )
-        problems += _extras(folder.path, folder.path, reading.records, outcome, **more)
-        _print(written, verbose, problems)
+        found, wrong = _outcome(folders)
+        outcome = RunOutcome(found.passed, looks=found.looks)
+        problems = [*_problems(readings), *refused, *unsaved, *wrong]
+        problems.append(write_outcome(folder.path, outcome))
+        if any(reading.claims for reading in readings.values()):
+            problems.append(f"pytest --sim-resume={folder.path} judges the claims of the whole")
+        written = _show(folder.read(), outcome, folder.path, folder.path, verbose, problems, **more)
         if written.complete and not unsaved:
             print(where(folder.path / PAGE_NAME, Path.cwd()))
-    finally:
-        folder.close()
     return 0
 
 
@@ -163,14 +157,11 @@ def report_runs(
     tables, untold = ([], []) if run is None else write_tables(run, target)
     if not (reading.records or tables or untold):
         raise BadInput(f"{first}: it holds no repetition")
-    compared = outcome.compared
-    report = Report.of(reading, compared, outcome.looks)
-    written = Written(**vars(report)) if target is None else write_files(target, report, run)
-    extras = _extras(run, target, reading.records, outcome, **more)
-    _print(written, verbose, [*_problems(readings), *wrong, *written.problems, *extras])
+    problems = [*_problems(readings), *wrong]
+    written = _show(reading, outcome, run, target, verbose, problems, **more)
     width = shutil.get_terminal_size().columns
-    if compared is not None:
-        name, gate = compared
+    if outcome.compared is not None:
+        name, gate = outcome.compared
         text = render_changes(gate, width, bool(gate.changes))
         print(for_terminal(f"\nbaseline: {name}\n{text}"))
     if tables or untold:
@@ -201,7 +192,7 @@ def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, 
     if written.sweeps:
         yield sweep.TITLE, for_terminal("\n".join(sweep_lines(written.sweeps, width, verbose)))
     if written.histories:
-        yield "history", for_terminal("\n".join(history_lines(written.histories, width)))
+        yield "history", for_terminal(render_histories(written.histories, width))
 
 
 def text_of(report: Report, width: int, verbose: bool) -> str:
@@ -210,28 +201,31 @@ def text_of(report: Report, width: int, verbose: bool) -> str:
     return "\n".join([first, *(f"\n{title}\n{text}" for title, text in others)])
 
 
-def _print(written: Written, verbose: bool, problems: Iterable[str]) -> None:
+def _show(
+    reading: RunContents,
+    outcome: RunOutcome,
+    run: Path | None,
+    target: Path | None,
+    verbose: bool,
+    problems: list[str],
+    badge: str | None = None,
+    record: str | None = None,
+) -> Written:
+    """Write the report of a run into `target`, the badge into the file `badge`, and with `record`
+    recordings of the motions, where they are wanted; and print tables and problems."""
+    report = Report.of(reading, outcome.compared, outcome.looks)
+    written = Written(**vars(report)) if target is None else write_files(target, report, run)
+    problems += written.problems
+    if badge:
+        problems.append(write_badge(Path(badge), reading.records, outcome.passed))
+    if record and run is not None and target is not None:
+        problems += recordings(run, target, reading.records)
+    elif record:
+        problems.append("no recordings: join the runs with simbench merge first")
     print(text_of(written, shutil.get_terminal_size().columns, verbose))
     for problem in filter(None, problems):
         print(for_terminal(problem))
-
-
-def _extras(
-    run: Path | None,
-    target: Path | None,
-    records: Sequence[Record],
-    outcome: RunOutcome,
-    badge: str | None = None,
-    record: str | None = None,
-) -> list[str]:
-    """Write the badge into the file `badge`, and with `record` recordings of the motions, where
-    they are wanted; lines for the terminal."""
-    lines = [write_badge(Path(badge), records, outcome.passed)] if badge else []
-    if record and run is not None and target is not None:
-        lines += recordings(run, target, records)
-    elif record:
-        lines.append("no recordings: join the runs with simbench merge first")
-    return lines
+    return written
 
 
 def recordings(

@@ -12,10 +12,10 @@ import pytest
 
 from pytest_simbench.cli.values import BadInput, shown
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.measure.limits import CRASHED, named
+from pytest_simbench.measure.limits import named
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.records.metrics import Metric, UnknownMetric
+from pytest_simbench.records.metrics import CRASHED, Metric, UnknownMetric
 from pytest_simbench.records.series import series
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from importlib.metadata import version
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from pytest_simbench.client import environments
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.report.model.capabilities import columns
 from pytest_simbench.report.terminal.grid import aligned, fill, render
-from pytest_simbench.simulator.registry import adapter, known, problem, registered, registry
+from pytest_simbench.simulator.registry import adapter, known, problem, registry
 from pytest_simbench.simulator.settings import Settings, in_words, meanings, searched
 
 Missing = Callable[[str], str | None]
@@ -64,35 +65,26 @@ def _missing(cluster: str | None, builds: dict[str, str]) -> Missing:
     from pytest_simbench.cluster.offers import unmet
     from pytest_simbench.cluster.pool import Pool
 
-    pool = Pool(cluster)
-    try:
+    with closing(Pool(cluster)) as pool:
         nodes = pool.nodes()
-    finally:
-        pool.close()
     return lambda name: unmet(nodes, name, ["headless"])
 
 
 def _table(missing: Missing) -> Iterator[str]:
     """A line for each simulator; one that is not ready says how to learn more."""
-    cells: dict[str, tuple[str, ...] | str] = {}
+    rows: list[tuple[str, ...]] = [HEADINGS]
     for name in known():
         if broken := problem(name):
-            cells[name] = f"BROKEN: {broken}"
+            rows.append((name, "-", f"BROKEN: {broken}"))
         elif missing(name):
-            cells[name] = f"no: not here; simbench list {name} says how to get it"
+            rows.append((name, "-", f"no: not here; simbench list {name} says how to get it"))
         else:
             profiles = adapter(name).profiles
             has = ("yes" if profile in profiles else "-" for profile in ("tuned", "real"))
             settings = profiles.get("tuned") or next(iter(profiles.values()))
             step = f"{1000 * settings.timestep:.3g} ms"
-            cells[name] = (_version(name) or "-", "yes", *has, step)
-    rows = [cell for cell in cells.values() if not isinstance(cell, str)]
-    widths = [max(map(len, column)) for column in zip(HEADINGS[1:], *rows, strict=True)]
-    first = max(map(len, [HEADINGS[0], *cells]))
-    for name, row in {HEADINGS[0]: HEADINGS[1:], **cells}.items():
-        row = ("-", row) if isinstance(row, str) else row
-        padded = [text.ljust(width) for text, width in zip(row, widths, strict=False)]
-        yield "  ".join([name.ljust(first), *padded]).rstrip()
+            rows.append((name, _version(name) or "-", "yes", *has, step))
+    yield from aligned(rows)
 
 
 def _settings(name: str) -> Iterator[str]:
@@ -127,7 +119,7 @@ def _paragraphs(
     too, and the reasons of those whose adapter is broken."""
     if not names:
         width = shutil.get_terminal_size((160, 24)).columns
-        yield render(columns([adapter(name).info for name in registered()]), width)
+        yield render(columns(), width)
         yield ""
     for name in names or known():
         if broken := problem(name):

@@ -189,8 +189,7 @@ class ClosedLoop:
         first = next(self._questions)
         self._see(first)
         told = self._sight.told(np.frombuffer(first, count=self._sight.numbers))
-        assert scene.robot is not None  # `Sight` has looked
-        self._points = SetPoints(scene.robot, told[0], told[2], 1 / rhythm.rate, kinematics)
+        self._points = SetPoints(scene.arm, told[0], told[2], 1 / rhythm.rate, kinematics)
 
     def _see(self, question: bytes) -> None:
         """Numbers of the state, then a picture, then forces, of what was asked for."""

@@ -27,17 +27,17 @@ CONTENT = "content"
 """Key under which a robot's wire form carries its description."""
 
 
-def description_xml(robot: Robot, name_of: Callable[[Path], str] = str) -> ET.Element:
-    """Links and joints of a robot's URDF, collision shapes only, its meshes named anew by
-    `name_of`, by default with their absolute paths.
+def description_xml(robot: Robot) -> ET.Element:
+    """Links and joints of a robot's URDF, collision shapes only, the absolute paths of its meshes.
 
     Raises:
         DescriptionError: a file is missing or wrong; says which.
     """
-    return _collision_xml(Description(robot.urdf, robot.packages), robot.name, name_of)
+    return _collision_xml(Description(robot.urdf, robot.packages), robot.name, str)
 
 
 def _collision_xml(checked: Description, name: str, name_of: Callable[[Path], str]) -> ET.Element:
+    """The same of a description that was read, its meshes named anew."""
     root = ET.Element("robot", name=name)
     for element in deepcopy(checked.xml):
         if element.tag not in ("link", "joint"):

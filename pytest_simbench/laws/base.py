@@ -141,19 +141,21 @@ class Watched:
         t: of each sample [s], from dt on, (n,).
         joints: positions and velocities, (n, 2, n_joints).
         bodies: rows as `World.bodies`, (n, n_free, 13).
+        start: the rows before the first step, (n_free, 13).
     """
 
     dt: float
     t: FloatArray
     joints: FloatArray
     bodies: FloatArray
+    start: FloatArray
 
     @classmethod
-    def of(cls, motion: Motion) -> Watched:
-        """A motion of every step, of one at least."""
+    def of(cls, start: FloatArray, motion: Motion) -> Watched:
+        """A motion of every step, of one at least, and the bodies' states before it."""
         first = float(motion.time[0])
         dt = float(motion.time[1]) - first if len(motion) > 1 else first
-        return cls(dt, motion.time, motion.joints, motion.bodies)
+        return cls(dt, motion.time, motion.joints, motion.bodies, start)
 
     @property
     def steps(self) -> int:
@@ -190,12 +192,12 @@ class Watched:
 
 def watch(world: World, duration: float) -> Watched:
     """Let `duration` [s] pass in a world that was just loaded, and see every step of it."""
-    return Watched.of(world.wait(duration, log_period=0.0))
+    return Watched.of(world.bodies.copy(), world.wait(duration, log_period=0.0))
 
 
 def follow(world: World, rows: Trajectory) -> Watched:
     """The same while the drives follow set points."""
-    return Watched.of(world.follow(rows, log_period=0.0))
+    return Watched.of(world.bodies.copy(), world.follow(rows, log_period=0.0))
 
 
 def held(position: float, seconds: float, velocity: float = 0.0, effort: float = 0.0) -> Trajectory:

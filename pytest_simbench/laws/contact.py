@@ -44,10 +44,8 @@ class _Stack(Law, phenomenon="stacking", quantity="way of the top cube", unit="m
         ]
         return Scene(self.name, tuple(bodies))
 
-    def measure(self, world: World) -> Reading:
-        start = world.bodies[-1, :3].copy()
-        seen = watch(world, self.seconds)
-        off = float(np.linalg.norm(seen.bodies[-1, -1, :3] - start))
+    def read(self, seen: Watched) -> Reading:
+        off = float(np.linalg.norm(seen.bodies[-1, -1, :3] - seen.start[-1, :3]))
         n = len(self.masses)
         return Reading(off, 0.0, stillness(seen.dt, n * EDGE, n))
 
@@ -149,15 +147,12 @@ class TippingSlope(
     def build(self) -> Scene:
         return slopes(self.name, self.size[0] / self.size[2], self.size, 0.0, 1.0)
 
-    def measure(self, world: World) -> Reading:
-        critical = self.size[0] / self.size[2]
-        before = [rotation_matrix(row[3:7]) for row in world.bodies]
-        world.wait(self.seconds)
+    def read(self, seen: Watched) -> Reading:
         turned = []
-        for start, row in zip(before, world.bodies, strict=True):
-            up = float(start[:, 2] @ rotation_matrix(row[3:7])[:, 2])
-            turned.append(math.acos(min(1.0, up)) > 0.05)
-        return fan(critical, turned)
+        for rows in zip(seen.start, seen.bodies[-1], strict=True):
+            before, now = (rotation_matrix(row[3:7])[:, 2] for row in rows)
+            turned.append(math.acos(min(1.0, float(before @ now))) > 0.05)
+        return fan(self.size[0] / self.size[2], turned)
 
 
 def tilt(row: FloatArray) -> float:
@@ -195,10 +190,9 @@ class Pivot(Law, phenomenon="rolling", quantity="angle turned", unit="rad"):
         angle, rate = solved(fall, [start, 0.0], seconds)[-1]
         return start - float(angle), abs(float(rate)), GRAVITY * radius / inertia
 
-    def measure(self, world: World) -> Reading:
-        before = rotation_matrix(world.bodies[0, 3:7])
-        seen = watch(world, self.seconds)
+    def read(self, seen: Watched) -> Reading:
         t = seen.end
-        along = before[:, 0] @ rotation_matrix(seen.bodies[-1, 0, 3:7])[:, 0]
+        before, now = (rotation_matrix(row[0, 3:7])[:, 0] for row in (seen.start, seen.bodies[-1]))
+        along = before @ now
         exact, rate, change = self.exact(t)
         return seen.reading(math.acos(min(1.0, float(along))), exact, (rate + change * t), 1.0)

@@ -9,8 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pytest_simbench.client.world import World
-from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, solved, watch
+from pytest_simbench.laws.base import GRAVITY, LONG, Law, Reading, Watched, solved
 from pytest_simbench.scene import (
     STANDARD_GRAVITY,
     Box,
@@ -322,12 +321,11 @@ class AxialForce(Law, phenomenon=FREE, quantity="speed along the axis", unit="m/
     def build(self) -> Scene:
         return Scene(self.name, (self.rod(),), gravity=WEIGHTLESS)
 
-    def measure(self, world: World) -> Reading:
-        return self._reading(world, 7, self.force / MASS)
+    def read(self, seen: Watched) -> Reading:
+        return self._reading(seen, 7, self.force / MASS)
 
-    def _reading(self, world: World, column: int, rate: float) -> Reading:
+    def _reading(self, seen: Watched, column: int, rate: float) -> Reading:
         """Of a column of the state that grows by `rate` in a second while the wrench acts."""
-        seen = watch(world, self.seconds)
         exact = rate * (self.end - self.start)
         return seen.reading(seen.bodies[-1, 0, column], exact, rate, exact)
 
@@ -342,5 +340,5 @@ class AxialTorque(AxialForce, quantity="angular velocity about the axis", unit="
     def wrench(self) -> Wrench:
         return Wrench(torque=(self.torque, 0.0, 0.0), start=self.start, end=self.end)
 
-    def measure(self, world: World) -> Reading:
-        return self._reading(world, 10, self.torque / (MASS * RADIUS**2 / 2))
+    def read(self, seen: Watched) -> Reading:
+        return self._reading(seen, 10, self.torque / (MASS * RADIUS**2 / 2))

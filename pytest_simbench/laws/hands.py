@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -45,32 +45,9 @@ SQUEEZE = 5.0
 """Of each finger [N]."""
 
 
-def of_scene(scene: Scene) -> Robot:
-    """The scene's robot.
-
-    Raises:
-        LookupError: it has none.
-    """
-    if scene.robot is None:
-        raise LookupError(f"scene {scene.name!r} has no robot to command")
-    return scene.robot
-
-
-def with_joint(robot: Robot, *names: str, **values: Any) -> Robot:
-    """The same robot with values of some joints replaced."""
-    joints = tuple(replace(j, **values) if j.name in names else j for j in robot.joints)
-    return replace(robot, joints=joints)
-
-
-def squeezing(robot: Robot, force: float) -> Robot:
-    """The same robot, each finger pressing with at most `force` [N]."""
-    robot = with_joint(robot, *robot.gripper.joints, effort_limit=force)
-    return replace(robot, gripper=replace(robot.gripper, squeeze=force))
-
-
 def around(robot: Robot, gap: float = GAP) -> Robot:
     """The same robot, each finger `gap` [m] from what is held."""
-    return with_joint(robot, *robot.gripper.joints, initial_position=HELD / 2 + gap)
+    return robot.with_joints(*robot.gripper.joints, initial_position=HELD / 2 + gap)
 
 
 def gravity_effort(robot: Robot, q: FloatArray, gravity: Vector3 = STANDARD_GRAVITY) -> FloatArray:
@@ -81,14 +58,14 @@ def gravity_effort(robot: Robot, q: FloatArray, gravity: Vector3 = STANDARD_GRAV
 
 def hold_command(scene: Scene, timestep: float) -> Trajectory:
     """One command: everything at its start, gravity compensated."""
-    robot = of_scene(scene)
+    robot = scene.arm
     start = robot.column("initial_position")
     return Trajectory.holding(timestep, start, gravity_effort(robot, start, scene.gravity))
 
 
 def close_command(scene: Scene, timestep: float) -> Trajectory:
     """The same with the fingers closed."""
-    robot, told = of_scene(scene), hold_command(scene, timestep)
+    robot, told = scene.arm, hold_command(scene, timestep)
     told.position[:, robot.finger_indices] = robot.gripper.closed
     told.effort[:, robot.finger_indices] = 0.0
     return told
@@ -104,7 +81,7 @@ class _Grip(Law, phenomenon="grasping"):
 
     def build(self) -> Scene:
         """Gravity is turned by `aside` [rad] within the plane of the fingers."""
-        robot = around(squeezing(panda(), SQUEEZE))
+        robot = around(panda(squeeze=SQUEEZE))
         tool = RobotModel(robot).tool_pose(robot.column("initial_position"))
         x, _, z = tool.rotation().T
         a, b, c = (math.cos(self.aside) * z + math.sin(self.aside) * x) * GRAVITY
@@ -124,7 +101,7 @@ class GripHolds(_Grip, quantity="way in the hand in 0.35 s", unit="m", held_for=
     load: float = 0.8
 
     def read(self, seen: Watched) -> Reading:
-        model = RobotModel(of_scene(self.build()))
+        model = RobotModel(self.build().arm)
 
         def in_hand(k: int) -> FloatArray:
             tool = model.tool_pose(seen.joints[k, 0, : model.arm])

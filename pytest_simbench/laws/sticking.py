@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pytest_simbench.client.world import World
 from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, stillness
 from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.scene import Box, FloatArray, Pose, Scene, Trajectory, Vector3
@@ -90,13 +89,11 @@ class StickAngleX(
     def build(self) -> Scene:
         return slopes(self.name, self.friction, SLAB, self.direction, self.friction)
 
-    def measure(self, world: World) -> Reading:
-        start = world.bodies[:, :3].copy()
-        world.wait(self.seconds)
-        moved = np.linalg.norm(world.bodies[:, :3] - start, axis=1)
+    def read(self, seen: Watched) -> Reading:
+        moved = np.linalg.norm(seen.bodies[-1, :, :3] - seen.start[:, :3], axis=1)
         steep = math.atan(self.friction)
         pull = GRAVITY * math.cos(steep) * BETWEEN * self.friction
-        least = pull * world.time**2 / 4
+        least = pull * seen.end**2 / 4
         return fan(self.friction, [bool(way > least) for way in moved])
 
 

@@ -6,10 +6,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.power import alike_rate, least_supported, passing_rate
 from pytest_simbench.measure.verdicts import confidence
-from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.metrics import CRASHED, Metric
 
 
 def main(arguments: Sequence[str] = ()) -> None:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from pytest_simbench.measure.comparison import Alternative, MeanDifference, compare_by_seed
-from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.results import ResultSet
-from pytest_simbench.measure.speed import without_speed
+from pytest_simbench.measure.speed import compared
 from pytest_simbench.records.metrics import Metric
 
 
@@ -31,27 +29,6 @@ def first_worse(number: int, is_worse: Callable[[int], bool]) -> int:
     return bad
 
 
-def has_value(metric: Metric, result: ResultSet) -> bool:
-    """Whether a repetition has a value."""
-    return bool(result.crashed_by_seed() if metric is CRASHED else result.values(metric.name))
-
-
-def difference(metric: Metric, before: ResultSet, after: ResultSet) -> MeanDifference:
-    """Whether the second is worse than the first, one-sided, paired by seed.
-
-    Raises:
-        ValueError: a side has no value.
-    """
-    if metric is CRASHED:
-        sides = before.crashed_by_seed(), after.crashed_by_seed()
-    else:
-        usual = before.by_seed(metric.name), after.by_seed(metric.name)
-        sides = without_speed(metric.name, before, after) or usual
-    worse: Alternative = "less" if metric.better == "higher" else "greater"
-    sole = before.sole(metric.name) and after.sole(metric.name)
-    return compare_by_seed(*sides, worse, sole=sole)
-
-
 def like_the_bad_one(metric: Metric, good: ResultSet, bad: ResultSet, other: ResultSet) -> bool:
     """Whether a release is nearer to the bad one than to the good one; so is one that has no value,
     for instance since it always crashes.
@@ -59,10 +36,9 @@ def like_the_bad_one(metric: Metric, good: ResultSet, bad: ResultSet, other: Res
     A test against the good one alone would call every release good that few repetitions cannot
     tell from it.
     """
-    if not has_value(metric, other):
+    if not other.values(metric):
         return True
-    here = difference(metric, good, other).difference
-    there = difference(metric, good, bad).difference
+    here, there = (compared(metric, good, one)[0].difference for one in (other, bad))
     return here / there > 0.5
 
 

@@ -30,9 +30,8 @@ from pytest_simbench.measure.comparison import (
     equivalence,
 )
 from pytest_simbench.measure.intervals import SEED, varies
-from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.speed import POWER, control, evened
-from pytest_simbench.records.metrics import COSTS, Metric
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric
 from pytest_simbench.records.record import Record
 
 Family = Literal["outcome", "cost"]
@@ -145,8 +144,6 @@ Values = Mapping[int, float | None]
 
 def _values(ended: Mapping[Any, Sequence[Record]], metric: Metric) -> dict[Any, Values]:
     """By side."""
-    if metric is CRASHED:
-        return {key: {r.seed: float(not r.ok) for r in found} for key, found in ended.items()}
     found: dict[Any, Values] = {
         key: {r.seed: r.value(metric) for r in records} for key, records in ended.items()
     }

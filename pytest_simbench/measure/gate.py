@@ -24,17 +24,16 @@ from pytest_simbench.measure import crashes
 from pytest_simbench.measure.comparison import (
     ALPHA,
     PERMUTATIONS,
-    Alternative,
     MeanDifference,
     compare_by_seed,
     holm,
 )
-from pytest_simbench.measure.limits import CRASHED, Limit
+from pytest_simbench.measure.limits import Limit
 from pytest_simbench.measure.results import ResultSet
-from pytest_simbench.measure.speed import POWER, without_speed
+from pytest_simbench.measure.speed import POWER, compared, without_speed
 from pytest_simbench.records.configuration import differences, other_meanings
 from pytest_simbench.records.folder import RunContents
-from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.metrics import CRASHED, Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import RowKey, by_test, grouped
 
@@ -288,7 +287,7 @@ def _rises(
     limit = next((limit for limit in limits if limit.metric == CRASHED.name), NO_MORE)
     found, chances = [], []
     for test, (old, new) in sides.items():
-        first, second = old.crashed_by_seed(), new.crashed_by_seed()
+        first, second = old.by_seed(CRASHED), new.by_seed(CRASHED)
         if first and second:
             comparison = compare_by_seed(first, second, "greater")
             chances.append(crashes.rise(first, second, comparison.paired))
@@ -319,16 +318,13 @@ def _change(
             "it depends on the machine, which was another one, and not every repetition has the "
             "control workload that takes the machine's speed out"
         )
-    evened = without_speed(metric.name, old, new)
-    first, second = evened or (old.by_seed(metric.name), new.by_seed(metric.name))
-    if not first or not second:
-        return LOST if first else "no repetition of the baseline has a value"
-    worse: Alternative = "less" if metric.better == "higher" else "greater"
-    sole = old.sole(metric.name) and new.sole(metric.name)
-    comparison = compare_by_seed(first, second, "two-sided" if both_ways else worse, sole=sole)
+    if not old.values(metric):
+        return "no repetition of the baseline has a value"
+    if not new.values(metric):
+        return LOST
+    comparison, evened = compared(metric, old, new, both_ways=both_ways)
     loss = limit.loss(metric, comparison.first, comparison.second)
-    p_value = comparison.p_value
-    return Change(test, metric, limit, comparison, p_value, loss, evened is not None)
+    return Change(test, metric, limit, comparison, comparison.p_value, loss, evened)
 
 
 def _of_machines(old: ResultSet, new: ResultSet, name: str) -> bool:

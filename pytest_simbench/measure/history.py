@@ -14,11 +14,10 @@ from dataclasses import dataclass, field, replace
 
 from pytest_simbench.ground.versions import BUILD, RELEASE, VersionedName, release_numbers
 from pytest_simbench.measure.change_points import ChangePoint, change_points, steps
-from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import without_speed
-from pytest_simbench.records.metrics import Metric, significant
+from pytest_simbench.records.metrics import CRASHED, Metric, significant
 from pytest_simbench.records.phenomena import PHENOMENON, ordered
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import RowKey, grouped, series
@@ -155,26 +154,24 @@ def _courses(history: TaskHistory) -> list[MetricCourse]:
     results = history.results
     metrics = list(results[-1].metrics.values())
     metrics += [results[-1].metric(name) for name in COSTS if name not in results[-1].metrics]
-    courses = [MetricCourse(m, tuple(_values(m.name, results, k) for k in range(len(results))))
-               for m in metrics]  # fmt: skip
-    courses.append(MetricCourse(CRASHED, tuple(result.crashed_by_seed() for result in results)))
+    first = next((result for result in results if result.ok), results[0])
+    courses = (
+        MetricCourse(metric, tuple(_values(metric, first, result) for result in results))
+        for metric in (*metrics, CRASHED)
+    )
     return [course for course in courses if any(course.values)]
 
 
-def _values(name: str, results: Sequence[ResultSet], place: int) -> Mapping[int, float]:
+def _values(metric: Metric, first: ResultSet, result: ResultSet) -> Mapping[int, float]:
     """A metric of one release by seed; of a cost as on a machine as fast as at the first one."""
-    first = next((result for result in results if result.ok), None)
-    if first is not None and results[place].ok:
-        evened = without_speed(name, first, results[place])
-        if evened is not None:
-            return evened[1]
-    return results[place].by_seed(name)
+    even = without_speed(metric.name, first, result)
+    return result.by_seed(metric) if even is None else even[1]
 
 
 def _changed(course: MetricCourse, rows: int, history: TaskHistory) -> MetricCourse:
     present = [values for values in course.values if values]
     sides = zip(history.results, course.values, strict=True)
-    sole = all(result.sole(course.metric.name) for result, values in sides if values)
+    sole = all(result.sole(course.metric) for result, values in sides if values)
     found = steps(present) if sole else change_points(present, rows=rows)
     if course.metric.name in COSTS:
         found = [c for c in found if abs(c.after - c.before) > SMALLEST * abs(c.before)]

@@ -11,12 +11,7 @@ from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from numbers import Real
 
-from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric, significant
-
-CRASHED = Metric(
-    "crashed", "crashed repetitions", better="lower", kind="yes_no", doc="1 for each that crashed"
-)
-"""The share of crashed repetitions, as a metric of every task."""
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric, UnknownMetric, significant
 
 ALIASES = {"failures": CRASHED.name}
 """Names of before, which users may still type."""

@@ -8,8 +8,8 @@ from dataclasses import replace
 from math import inf, isfinite
 from typing import NoReturn
 
-from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval, proportion
-from pytest_simbench.measure.limits import CRASHED, check_threshold
+from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval
+from pytest_simbench.measure.limits import check_threshold
 from pytest_simbench.measure.verdicts import (
     ERROR,
     Bound,
@@ -20,7 +20,7 @@ from pytest_simbench.measure.verdicts import (
     confidence,
     judge,
 )
-from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric, UnknownMetric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped
 
@@ -62,7 +62,7 @@ class ResultSet:
         self.records: tuple[Record, ...] = tuple(records)
         self.metrics: dict[str, Metric] = {metric.name: metric for metric in metrics}
         self._costs = {metric.name: metric for metric in COSTS if metric.name not in self.metrics}
-        self._intervals: dict[tuple[str, float], Interval] = {}
+        self._intervals: dict[tuple[Metric, float], Interval] = {}
         self._ok: tuple[tuple[Record, ...], tuple[Record, ...]] = ((), ())
         self.judged: list[tuple[Metric, Judgement]] = []
 
@@ -87,12 +87,11 @@ class ResultSet:
             self._ok = self.records, tuple(record for record in self.records if record.ok)
         return self._ok[1]
 
-    def sole(self, name: str) -> bool:
-        """Whether a metric (no cost), or whether it crashes, is one value, which every repetition
-        there could be would have."""
-        found: Iterable[float] = self.values(name) if name in self.metrics else ()
-        found = self.crashed_by_seed().values() if name == CRASHED.name else found
-        return all(record.notes.sole for record in self.records) and len({*found}) == 1
+    def sole(self, name: str | Metric) -> bool:
+        """Whether a metric (no cost) is one value, which every repetition there could be would
+        have."""
+        drawn = self.metric(name) in COSTS or not all(record.notes.sole for record in self.records)
+        return not drawn and len({*self.values(name)}) == 1
 
     @property
     def crashed(self) -> tuple[Record, ...]:
@@ -116,66 +115,52 @@ class ResultSet:
         """Names of the metrics and costs that can be asked for."""
         return (*self.metrics, *self._costs)
 
-    def metric(self, name: str) -> Metric:
-        """The metric (or cost) of that name.
+    def metric(self, name: str | Metric) -> Metric:
+        """The metric (or cost) of that name; also one that is given itself, as `CRASHED`.
 
         Raises:
             UnknownMetric: there is none; the message lists the valid names.
         """
+        if isinstance(name, Metric):
+            return name
         found = self.metrics.get(name) or self._costs.get(name)
         if found is None:
             where = f" in {self.label}" if self.records else ""
             raise UnknownMetric(name, self.known, where)
         return found
 
-    def value(self, record: Record, name: str) -> float | None:
+    def value(self, record: Record, name: str | Metric) -> float | None:
         """What a record counts with at a metric; None where it has no value."""
         found = record.value(self.metric(name))
         return None if found is None else float(found)
 
-    def values(self, name: str) -> list[float]:
+    def values(self, name: str | Metric) -> list[float]:
         """A metric's values, one for each repetition that has one, in their order."""
         return [found for record in self.records if (found := self.value(record, name)) is not None]
 
-    def by_seed(self, name: str) -> dict[int, float]:
+    def by_seed(self, name: str | Metric) -> dict[int, float]:
         """A metric's values by seed, for pairing with another set."""
         found = ((record.seed, self.value(record, name)) for record in self.records)
         return {seed: value for seed, value in found if value is not None}
 
-    def crashed_by_seed(self) -> dict[int, float]:
-        """1 for each repetition that crashed, 0 for each that finished, by seed."""
-        return {r.seed: float(not r.ok) for r in (*self.ok, *self.crashed)}
-
-    def interval(self, name: str, confidence: float = CONFIDENCE) -> Interval:
-        """The interval of a metric's mean; without values its mean is nan and n is 0."""
-        key = (name, confidence)
+    def interval(self, name: str | Metric, confidence: float = CONFIDENCE) -> Interval:
+        """The interval of a metric's mean; without values its mean is nan and n is 0, and without
+        bounds where it is one value."""
+        key = (self.metric(name), confidence)
         if key not in self._intervals:
-            found = interval(self.values(name), self.metric(name), confidence)
-            self._intervals[key] = self._certain(name, found)
+            found = interval(self.values(name), *key)
+            if self.sole(name):
+                found = replace(found, low=-inf, high=inf, method="constant")
+            self._intervals[key] = found
         return self._intervals[key]
 
-    def _certain(self, name: str, found: Interval) -> Interval:
-        """An interval, without bounds where there is one value."""
-        return replace(found, low=-inf, high=inf, method="constant") if self.sole(name) else found
-
-    def crash_interval(self, confidence: float = CONFIDENCE) -> Interval:
-        """The interval of the share of repetitions that crash, interrupted ones left out.
-
-        Raises:
-            ValueError: no repetition has ended.
-        """
-        return proportion(len(self.crashed), len(self.ok) + len(self.crashed), confidence)
-
-    def judge(self, name: str, claim: Bound) -> Judgement:
+    def judge(self, name: str | Metric, claim: Bound) -> Judgement:
         """What the repetitions say of a claim about a metric's true mean."""
         return self._decide(claim, lambda: self._judged(self.metric(name)))
 
     def _judged(self, metric: Metric) -> Interval:
         """The interval by which claims about a metric, or about crashes, are judged."""
-        level = confidence(metric, self.error)
-        if metric is CRASHED:
-            return self._certain(CRASHED.name, self.crash_interval(level))
-        return self.interval(metric.name, level)
+        return self.interval(metric, confidence(metric, self.error))
 
     def _decide(self, claim: Bound, interval: Callable[[], Interval]) -> Judgement:
         return judge(claim, interval())
@@ -187,21 +172,22 @@ class ResultSet:
             LimitError: a threshold that the metric cannot reach; so do the other assertions.
         """
         __tracebackhide__ = True
-        self._assert(name, at_least(threshold))
+        self._assert(self.metric(name), at_least(threshold))
 
     def assert_at_most(self, name: str, threshold: float) -> None:
         """Fail when the true mean is above `threshold`; shares are in 0..1."""
         __tracebackhide__ = True
-        self._assert(name, at_most(threshold))
+        self._assert(self.metric(name), at_most(threshold))
 
     def assert_between(self, name: str, low: float, high: float) -> None:
         """Fail when the true mean is outside `low`..`high`; shares are in 0..1."""
         __tracebackhide__ = True
+        metric = self.metric(name)
         for value in (low, high):
-            check_threshold(self.metric(name), value)
+            check_threshold(metric, value)
         if low > high:
             raise ValueError(f"{name} cannot lie between {low:g} and {high:g}: low is above high")
-        self._assert(name, at_least(low), at_most(high))
+        self._assert(metric, at_least(low), at_most(high))
 
     def assert_no_crashes(self) -> None:
         """Fail when a repetition crashed, or when none was recorded."""
@@ -216,12 +202,8 @@ class ResultSet:
     def assert_crashed_at_most(self, share: float) -> None:
         """Fail when more than `share` (0..1) of all repetitions ever made would crash."""
         __tracebackhide__ = True
-        check_threshold(CRASHED, share)
         self.claims_crashes = True
-        self._assert_recorded()
-        found = self._decide(at_most(share), lambda: self._judged(CRASHED))
-        sentence = f"{self._crashes()} ({self._bounds(CRASHED, found.interval)})"
-        self._tell([found], CRASHED, lambda: sentence)
+        self._assert(CRASHED, at_most(share))
 
     assert_no_failures, assert_failures_at_most = assert_no_crashes, assert_crashed_at_most
 
@@ -249,41 +231,34 @@ class ResultSet:
         self.judged.append((CRASHED, found))
         raise AssertionError(f"{self._crashes()}{why}")
 
-    def _assert(self, name: str, *claims: Bound) -> None:
+    def _assert(self, metric: Metric, *claims: Bound) -> None:
         __tracebackhide__ = True
-        metric = self.metric(name)
         for claim in claims:
             check_threshold(metric, claim.value)
         self._assert_recorded()
-        if not self.ok:
-            raise AssertionError(f"{name} cannot be judged: {self._crashes()}")
-        if all(self.value(record, name) is None for record in self.ok):
+        if not self.ok and metric is not CRASHED:
+            raise AssertionError(f"{metric.name} cannot be judged: {self._crashes()}")
+        if self.ok and all(self.value(record, metric) is None for record in self.ok):
             raise AssertionError(
-                f"{self.label}: {name} is not available in any of the {len(self.ok)} repetitions "
-                "that finished"
+                f"{self.label}: {metric.name} is not available in any of the {len(self.ok)} "
+                "repetitions that finished"
             )
-        found = [self.judge(name, claim) for claim in claims]
-        self._tell(found, metric, lambda: self._measured(metric))
-
-    def _tell(
-        self, found: Sequence[Judgement], metric: Metric, measured: Callable[[], str]
-    ) -> None:
-        """Fail, warn or say nothing."""
-        __tracebackhide__ = True
+        found = [self.judge(metric, claim) for claim in claims]
         self.judged += [(metric, judgement) for judgement in found]
         for judgement in found:
             if judgement.verdict is Verdict.REFUTED:
                 wrong = "below" if judgement.claim.relation == "at least" else "above"
                 limit = metric.format(judgement.claim.value)
-                raise AssertionError(f"{measured()}, which is {wrong} {limit}")
+                raise AssertionError(f"{self._measured(metric)}, which is {wrong} {limit}")
         for judgement in found:
             if not judgement.verdict.decided:
-                claim = f"{judgement.claim.relation} {metric.format(judgement.claim.value)}"
-                text = f"{measured()}: {judgement.verdict} whether {claim}, {judgement.advice}"
+                asked = f"{judgement.claim.relation} {metric.format(judgement.claim.value)}"
+                told = f"{judgement.verdict} whether {asked}, {judgement.advice}"
+                text = f"{self._measured(metric)}: {told}"
                 if self.strict:
                     raise AssertionError(f"{text} (--sim-strict)")
                 if self.warns:
-                    warnings.warn(text, InconclusiveWarning, stacklevel=4)
+                    warnings.warn(text, InconclusiveWarning, stacklevel=3)
 
     def _assert_recorded(self) -> None:
         __tracebackhide__ = True
@@ -302,8 +277,10 @@ class ResultSet:
     def _measured(self, metric: Metric) -> str:
         """What was measured, with simulator, mode, profile, bounds and number of repetitions."""
         found, crashed = self._judged(metric), len(self.crashed)
+        if metric is CRASHED:
+            return f"{self._crashes()} ({self._bounds(metric, found)})"
         number = f"{found.n} repetition{'s' if found.n > 1 else ''}"
-        if crashed and self.value(self.crashed[0], metric.name) is not None:
+        if crashed and self.value(self.crashed[0], metric) is not None:
             number += f", {crashed} crashed and counted as {metric.format(metric.crashed or 0.0)}"
         elif crashed:
             number += f" that finished, {crashed} crashed"

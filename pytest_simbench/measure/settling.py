@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Record, Who
 from pytest_simbench.records.series import grouped, settled
 
 TASK = "settling"
@@ -20,9 +20,6 @@ TASK = "settling"
 
 ALIKE = 1.0
 """Two ends are alike where no body lies farther apart [mm]: what tables print of a length."""
-
-Who = tuple[str, str, str]
-"""Simulator as named, mode, profile."""
 
 
 @dataclass(frozen=True)
@@ -157,12 +154,12 @@ def _settled(records: Sequence[Record]) -> Settled | None:
     steps: dict[Who, float] = {}
     for record in records:
         if _moved(record) == 0:
-            steps[_who(record)] = max(steps.get(_who(record), 0.0), _step(record))
+            steps[record.who] = max(steps.get(record.who, 0.0), _step(record))
     written: dict[Who, Ends] = {}
     moved: dict[float, dict[Who, Ends]] = {}
     finer: dict[int, dict[Who, Ends]] = {}
     cost: dict[Who, float | None] = {}
-    groups = grouped(records, lambda r: (_who(r), _moved(r), _step(r)))
+    groups = grouped(records, lambda r: (r.who, _moved(r), _step(r)))
     for (who, amount, step), group in groups.items():
         if who not in steps:
             continue
@@ -198,10 +195,6 @@ def _ends(records: Sequence[Record], bodies: Sequence[str]) -> Ends:
         sum(record.status == "failed" for record in records),
         float(np.mean(known)) if known else None,
     )
-
-
-def _who(record: Record) -> Who:
-    return record.simulator, record.mode, record.profile
 
 
 def _moved(record: Record) -> float:

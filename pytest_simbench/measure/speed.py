@@ -10,7 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from pytest_simbench.measure.comparison import Alternative, MeanDifference, compare_by_seed
 from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 
 Values = dict[int, float]
@@ -36,6 +38,25 @@ def without_speed(name: str, before: ResultSet, after: ResultSet) -> tuple[Value
     usual = math.fsum(control(r, name) for r in before.ok) / len(before.ok) or 1.0
     first, second = (evened(side.ok, name, usual) for side in (before, after))
     return None if first is None or second is None else (first, second)
+
+
+def compared(
+    metric: Metric, before: ResultSet, after: ResultSet, *, both_ways: bool = False
+) -> tuple[MeanDifference, bool]:
+    """Whether a metric is worse in the second run than in the first (`both_ways`: another one), by
+    seed; and whether the machine's speed was taken out.
+
+    Raises:
+        ValueError: a side has no value.
+    """
+    even = without_speed(metric.name, before, after)
+    worse: Alternative = "less" if metric.better == "higher" else "greater"
+    found = compare_by_seed(
+        *(even or (before.by_seed(metric), after.by_seed(metric))),
+        "two-sided" if both_ways else worse,
+        sole=before.sole(metric) and after.sole(metric),
+    )
+    return found, even is not None
 
 
 def evened(records: Sequence[Record], name: str, usual: float) -> Values | None:

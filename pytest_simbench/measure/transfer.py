@@ -50,7 +50,7 @@ from numpy.typing import NDArray
 from pytest_simbench.measure.comparison import ALPHA, holm
 from pytest_simbench.measure.intervals import CONFIDENCE, FEWEST, SEED, Interval
 from pytest_simbench.records.configuration import TASK, text
-from pytest_simbench.records.record import Record, plain
+from pytest_simbench.records.record import Record, Who, plain
 from pytest_simbench.records.series import RowKey, grouped
 
 METRIC, POLICY = "success", f"{TASK}policy"
@@ -70,9 +70,6 @@ MOST = 10_000
 """Seeds beyond which no number is told."""
 
 Array = NDArray[np.float64]
-Who = tuple[str, str, str]
-"""Simulator as named, mode, profile."""
-
 Verdict = Literal["alike", "different", "open", "undefined"]
 
 
@@ -281,7 +278,7 @@ def _transfer(records: Sequence[Record]) -> Transfer | None:
     for r in records:
         value = 0.0 if r.status == "failed" else r.metrics.get(METRIC)
         if r.status != "interrupted" and value is not None:
-            of = found.setdefault((r.simulator, r.mode, r.profile), {})
+            of = found.setdefault(r.who, {})
             name = str(r.settings[POLICY])
             name += f" {str(r.settings.get(DIGEST))[:6]}" if twice[name] > 1 else ""
             of.setdefault(name, {})[r.seed] = float(value)

@@ -176,7 +176,7 @@ class PlanningScene:
         `opening`."""
         model = self.model
         fingers = np.full(model.pin.nq - model.arm, opening)
-        q = np.concatenate([model.robot.column("initial_position")[: model.arm], fingers])
+        q = np.concatenate([model.home, fingers])
         pin.updateGeometryPlacements(model.pin, model.data, self._geometry, self._exact, q)
         tool = pin.updateFramePlacement(model.pin, model.data, model.tool)
         corners = [

@@ -13,11 +13,3 @@ class PlanningError(Exception):
 
 class Unreachable(PlanningError):
     """No joint position within the limits brings the tool to the pose."""
-
-
-class InCollision(PlanningError):
-    """The start or the goal of a motion is in collision, or every straight way to it is."""
-
-
-class NoPath(PlanningError):
-    """The planner found no way between two free positions."""

@@ -290,8 +290,7 @@ def _standing(robot: Robot) -> Robot:
         )
     if any((np.clip(arm, model.lower, model.upper) != arm).any() for arm in robot.swing or ()):
         raise DescriptionError("[throw]: start or end lies outside the limits of the joints")
-    ready = robot.column("initial_position")[: model.arm]
-    touching = PlanningScene(model, Scene("ready", (), robot)).collision(ready)
+    touching = PlanningScene(model, Scene("ready", (), robot)).collision(model.home)
     if touching is not None:
         raise DescriptionError(
             f"in its ready position {' touches '.join(touching)}; change ready, or list two links "

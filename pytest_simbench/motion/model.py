@@ -43,6 +43,11 @@ class RobotModel:
         self._fingers = robot.column("initial_position")[self.arm : self.pin.nq]
 
     @property
+    def home(self) -> FloatArray:
+        """Arm joints where the robot begins, (arm,) [rad]."""
+        return self.robot.column("initial_position")[: self.arm]
+
+    @property
     def limits(self) -> MotionLimits:
         """Of the arm's motion.
 

@@ -17,7 +17,7 @@ import numpy as np
 from ompl import base, geometric, util
 
 from pytest_simbench.motion.collision import PlanningScene
-from pytest_simbench.motion.errors import InCollision, NoPath
+from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.kinematics import straight_line, tool_path
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.throw import Throw, feasible_swing, released
@@ -64,8 +64,7 @@ class MotionPlanner:
         """Collision-free motion between two arm positions, fingers commanded to stay.
 
         Raises:
-            InCollision: start or goal touch something.
-            NoPath: none found.
+            PlanningError: start or goal touch something, or no way was found.
         """
         direct = straight_move(start, goal, self.limits, speed=speed)
         if self.scene.first_collision(self._thinned(direct.position)) is None:
@@ -73,7 +72,7 @@ class MotionPlanner:
         for what, arm in (("start", start), ("goal", goal)):
             touching = self.scene.collision(arm)
             if touching is not None:
-                raise InCollision(f"{what} in collision: {' and '.join(touching)}")
+                raise PlanningError(f"{what} in collision: {' and '.join(touching)}")
         with _OMPL:
             path = self._search(start, goal, int(self.rng.integers(1, 2**31)))
         path = self._shortened(path)
@@ -94,7 +93,7 @@ class MotionPlanner:
 
         Raises:
             Unreachable: the line leaves the workspace.
-            InCollision: something else is in the way.
+            PlanningError: something else is in the way.
         """
         path = straight_line(self.model, start, target)
         timed = along_path(path, self.limits, speed=speed)
@@ -118,7 +117,7 @@ class MotionPlanner:
 
         Raises:
             Unreachable: the path leaves the workspace.
-            InCollision: something else is in the way.
+            PlanningError: something else is in the way.
         """
         path = tool_path(self.model, start, poses)
         points = [self.model.tool_pose(start).position, *(pose.position for pose in poses)]
@@ -135,7 +134,7 @@ class MotionPlanner:
             self._thinned(timed.position), ignored=ignored, margin=False
         )
         if touching is not None:
-            raise InCollision(f"{what} blocked: {' and '.join(touching)}")
+            raise PlanningError(f"{what} blocked: {' and '.join(touching)}")
         return self.set_points(timed, fingers)
 
     def move_fingers(
@@ -230,7 +229,7 @@ class MotionPlanner:
         planner.solve(base.PlannerTerminationCondition(lambda: checks > MAX_CHECKS))
         path = problem.getSolutionPath()
         if path is None or problem.hasApproximateSolution():
-            raise NoPath(f"no path found in {checks} checks")
+            raise PlanningError(f"no path found in {checks} checks")
         count = path.getStateCount()
         return np.array([[path.getState(k)[i] for i in range(arm)] for k in range(count)])
 

@@ -146,7 +146,7 @@ def _in_plane(model: RobotModel, landing: float) -> tuple[FloatArray, list[int]]
         RobotError: the arm has no such joints.
     """
     name = model.robot.name
-    ready = model.robot.column("initial_position")[: model.arm].copy()
+    ready = model.home
     tool, axes = model.tool_transform(ready), _axes(model, ready)
     if abs(axes[0, 2]) < ALONG or abs(axes[-1] @ tool.rotation[:, 2]) < ALONG:
         raise RobotError(

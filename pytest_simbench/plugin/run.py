@@ -32,10 +32,11 @@ from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.repeatability import NAME
-from pytest_simbench.report.files import write_badge, write_outcome, write_report
+from pytest_simbench.report.files import write_badge, write_files, write_outcome
 from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.markdown.github import append_summary
 from pytest_simbench.report.model.outcome import RunOutcome, looks_at
+from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.terminal.progress import Progress
 from pytest_simbench.tasks.base import Task
@@ -303,7 +304,7 @@ class Run:
             recorded = runs.recordings(path, path, records, self.progress)
         found = comparison.found if comparison else None
         looks = looks_at(path, self.resumed.records if self.resumed else (), records)
-        written = write_report(self.folder, self.reading, found, looks)
+        written = write_files(path, Report.of(self.reading, found, looks))
         unsaved = self.folder.flush()
         problems = [*self._problems, *self.reading.problems, *self.reading.refused]
         problems += [*written.problems, cluster.lost_nodes(records)]

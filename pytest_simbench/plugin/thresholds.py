@@ -10,10 +10,10 @@ from collections.abc import Iterable, Mapping
 
 import pytest
 
-from pytest_simbench.measure.limits import CRASHED, LimitError, check_gate, named
+from pytest_simbench.measure.limits import LimitError, check_gate, named
 from pytest_simbench.plugin import options
 from pytest_simbench.records.folder import RunContents
-from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric, UnknownMetric
 from pytest_simbench.repeatability.stability import KEPT
 
 OF_EVERY_TASK = (*COSTS, CRASHED, KEPT)

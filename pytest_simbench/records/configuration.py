@@ -214,6 +214,11 @@ def text(value: Any) -> str:
     return json.dumps(value, sort_keys=True)
 
 
+def bare(value: object) -> str:
+    """The same, but of a text without quotes."""
+    return value if isinstance(value, str) else text(value)
+
+
 def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
     """Maps as keys with dots; tuples and numpy values as a record's file holds them."""
     if isinstance(value, Mapping):

@@ -143,3 +143,8 @@ COSTS: tuple[Metric, ...] = (
 )
 """What a repetition cost, whatever its task; read from the record, see `record.Record.cost`. Costs
 always vary, so they have no resolution."""
+
+CRASHED = Metric(
+    "crashed", "crashed repetitions", better="lower", kind="yes_no", doc="1 for each that crashed"
+)
+"""The share of crashed repetitions, as a metric of every task."""

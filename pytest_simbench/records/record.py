@@ -6,11 +6,11 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, NamedTuple, TypedDict
 
 from pytest_simbench.records import checked
 from pytest_simbench.records.checked import Count, Name, Positive, Size
-from pytest_simbench.records.metrics import COSTS, Metric
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.upgrade import upgraded
 
@@ -44,6 +44,14 @@ class Failure:
     def cause(self) -> str:
         """Type and phase: what failures are counted by."""
         return f"{self.type} in {self.phase}" if self.phase else self.type
+
+
+class Who(NamedTuple):
+    """What did a repetition: a simulator as named, its mode and profile."""
+
+    simulator: str
+    mode: str
+    profile: str
 
 
 @dataclass(frozen=True)
@@ -110,6 +118,10 @@ class Record:
         return self.status == "ok"
 
     @property
+    def who(self) -> Who:
+        return Who(self.simulator, self.mode, self.profile)
+
+    @property
     def label(self) -> str:
         """Simulator, mode and profile, as messages name them."""
         return f"{self.simulator} {self.mode} ({self.profile})"
@@ -129,13 +141,16 @@ class Record:
         return replace(self, notes=replace(self.notes, **notes))
 
     def value(self, metric: Metric) -> float | None:
-        """What it counts with at a metric of its task, or at a cost; None where it has no value.
+        """What it counts with at a metric of its task, a cost, or `CRASHED`; None where it has no
+        value.
 
         A crashed repetition counts with the worst value, where the metric has one
         (`Metric.crashed`), but by the study's rules (`--protocol paper`), which leave it out. The
         costs of a crashed repetition are none.
         """
-        if self.status == "ok":
+        if metric is CRASHED:
+            return None if self.status == "interrupted" else float(not self.ok)
+        if self.ok:
             found = self.metrics.get(metric.name)
             return self.cost(metric.name) if found is None and metric in COSTS else found
         counts = self.status == "failed" and self.protocol != "paper"

@@ -10,6 +10,7 @@ from pytest_simbench.records.configuration import (
     ToldConfiguration,
     Use,
     agree,
+    bare,
     equal_to,
     text,
 )
@@ -182,12 +183,8 @@ def _follows(key: str, chief: str, known: Sequence[Mapping[str, object]]) -> boo
 
 def _difference(key: str, value: object) -> str:
     if key == ROBOT:
-        return f"robot={_shown(value)}" if value else "default robot"
-    return f"{key.removeprefix('settings.')}={_shown(value)}"
-
-
-def _shown(value: object) -> str:
-    return value if isinstance(value, str) else text(value)
+        return f"robot={bare(value)}" if value else "default robot"
+    return f"{key.removeprefix('settings.')}={bare(value)}"
 
 
 def comparable(a: Series, b: Series) -> bool:

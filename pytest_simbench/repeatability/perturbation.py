@@ -98,9 +98,10 @@ class Perturbation:
         if self.quantity == "delay":
             return scene
         if self.quantity == "friction":
-            return _with_friction(scene, factor)
+            return scene.with_frictions(lambda mu: mu * factor)
         if self.quantity == "squeeze":
-            return _squeezing(scene, factor)
+            squeeze = factor * scene.arm.gripper.squeeze
+            return replace(scene, robot=scene.arm.squeezing(squeeze))
         body = scene.body(self.body)
         if self.quantity == "mass":
             return scene.with_body(body.changed(mass=body.mass * factor))
@@ -108,27 +109,6 @@ class Perturbation:
             turned = Pose.at(0, 0, 0, yaw=self.amount) * Pose(quaternion=body.pose.quaternion)
             return scene.with_pose(self.body, Pose(body.pose.position, turned.quaternion))
         return scene.with_pose(self.body, body.pose.translated(**{self.quantity: self.amount}))
-
-
-def _with_friction(scene: Scene, factor: float) -> Scene:
-    bodies = tuple(body.changed(friction=body.friction * factor) for body in scene.bodies)
-    robot = scene.robot and replace(scene.robot, friction=scene.robot.friction * factor)
-    return replace(
-        scene, bodies=bodies, robot=robot, ground_friction=scene.ground_friction * factor
-    )
-
-
-def _squeezing(scene: Scene, factor: float) -> Scene:
-    robot = scene.robot
-    if robot is None:
-        raise ValueError(f"scene {scene.name!r} has no robot whose gripper could be perturbed")
-    fingers = robot.gripper.joints
-    joints = tuple(
-        replace(joint, effort_limit=joint.effort_limit * factor) if joint.name in fingers else joint
-        for joint in robot.joints
-    )
-    gripper = replace(robot.gripper, squeeze=robot.gripper.squeeze * factor)
-    return replace(scene, robot=replace(robot, joints=joints, gripper=gripper))
 
 
 def perturbed(scene: Scene, perturbations: Sequence[Perturbation]) -> Scene:
@@ -174,7 +154,7 @@ def perturbations(
     """
     from hypothesis import strategies as st
 
-    limits = {q.name: q.bound for q in QUANTITIES.values()} if bounds is None else dict(bounds)
+    limits = {q.name: q.bound for q in QUANTITIES.values()} if bounds is None else bounds
     for name in (name for name in limits if name not in QUANTITIES):
         raise ValueError(f"no quantity is named {name!r}; choose from {', '.join(QUANTITIES)}")
     there = {"cube": bool(scene.free_bodies), "scene": True, "robot": scene.robot is not None}

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pytest_simbench.ground.text import for_csv, for_terminal
-from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
@@ -20,7 +19,7 @@ from pytest_simbench.report.markdown.github import badge
 from pytest_simbench.report.markdown.run import render_run, render_tables
 from pytest_simbench.report.model.document import Table
 from pytest_simbench.report.model.outcome import NAME as OUTCOME
-from pytest_simbench.report.model.outcome import Compared, RunOutcome
+from pytest_simbench.report.model.outcome import RunOutcome
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import PHASES
 from pytest_simbench.report.page import PAGE_NAME
@@ -51,21 +50,6 @@ class Written(Report):
 
     problems: Sequence[str] = ()
     complete: bool = True
-
-
-def write_report(
-    folder: RunFolder,
-    reading: RunContents | None = None,
-    comparison: Compared | None = None,
-    looks: int = 1,
-) -> Written:
-    """Write all files from what a run folder holds, which may have been read already, into it.
-    How often the run was judged, and with what it was compared, see `outcome.Outcome`.
-
-    Raises:
-        RecordError: its records cannot be read.
-    """
-    return write_files(folder.path, Report.of(reading or folder.read(), comparison, looks))
 
 
 def write_files(

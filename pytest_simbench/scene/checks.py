@@ -59,6 +59,19 @@ def check_number(
         raise SceneError(f"{what} is {value!r:.80}; it must be {bound} {least:g} to {most:g}")
 
 
+def check_count(value: Any, what: str, most: float = LARGEST) -> None:
+    """A whole number from 1 to `most`."""
+    check_number(value, what, 1, most)
+    if value != int(value):
+        raise SceneError(f"{what} is {value!r:.80}; it must be a whole number")
+
+
+def check_choice(value: Any, what: str, choices: Sequence[str]) -> None:
+    """One of some words."""
+    if value not in choices:
+        raise SceneError(f"{what} is {value!r:.80}; choose from {', '.join(choices)}")
+
+
 def check_numbers(
     values: Any, count: int, what: str, least: float = -LARGEST, *, above: bool = False
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -283,23 +284,18 @@ class Robot(Wire):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise SceneError(f"robot {self.name!r} has several drives for {', '.join(twice)}")
-        unknown = [name for name in self.gripper.joints if name not in names]
-        if unknown:
-            raise SceneError(
-                f"the gripper of {self.name!r} has the joints {', '.join(unknown)}, which have no "
-                f"drives; choose from {', '.join(names)}"
-            )
+        coupled = [name for c in self.couplings for name in (c.follower, c.leader)]
+        for what, joints in (("the gripper", self.gripper.joints), ("a coupling", coupled)):
+            if unknown := sorted({*joints} - {*names}):
+                raise SceneError(
+                    f"{what} of {self.name!r} has the joints {', '.join(unknown)}, which have no "
+                    f"drives; choose from {', '.join(names)}"
+                )
         last = names[len(names) - len(self.beside) :]
         if self.beside != last or set(self.beside) & set(self.gripper.joints):
             raise SceneError(
                 f"the joints {', '.join(self.beside)} beside robot {self.name!r} are not its last, "
                 f"which are {', '.join(last)}; put them last, after the gripper's"
-            )
-        coupled = [name for c in self.couplings for name in (c.follower, c.leader)]
-        if unknown := sorted({name for name in coupled if name not in names}):
-            raise SceneError(
-                f"a coupling of {self.name!r} names the joints {', '.join(unknown)}, which have no "
-                f"drives; choose from {', '.join(names)}"
             )
         if self.limits is not None and len(self.limits.velocity) != len(self.arm_joints):
             raise SceneError(
@@ -323,14 +319,29 @@ class Robot(Wire):
         """Where the gripper's joints stand among `joints`."""
         return [self.joint_names.index(name) for name in self.gripper.joints]
 
+    def with_joints(self, *names: str, **values: Any) -> Robot:
+        """The same robot with values of some joints replaced."""
+        joints = (replace(j, **values) if j.name in names else j for j in self.joints)
+        return replace(self, joints=tuple(joints))
+
+    def scaled(self, *names: str, **factors: float) -> Robot:
+        """The same robot with values of some joints multiplied."""
+        scaled = self
+        for joint in self.joints:
+            if joint.name in names:
+                values = {key: factor * getattr(joint, key) for key, factor in factors.items()}
+                scaled = scaled.with_joints(joint.name, **values)
+        return scaled
+
     def as_motors(self) -> Robot:
         """The same robot, the drives of its arm pushing the commanded efforts alone."""
-        arm = {joint.name for joint in self.arm_joints}
-        motors = (
-            replace(joint, stiffness=FREE, damping=0.0) if joint.name in arm else joint
-            for joint in self.joints
-        )
-        return replace(self, joints=tuple(motors))
+        names = (joint.name for joint in self.arm_joints)
+        return self.with_joints(*names, stiffness=FREE, damping=0.0)
+
+    def squeezing(self, force: float) -> Robot:
+        """The same robot, each finger pressing with at most `force` [N], or [N m] of a jaw."""
+        robot = self.with_joints(*self.gripper.joints, effort_limit=force)
+        return replace(robot, gripper=replace(self.gripper, squeeze=force))
 
     def column(self, attribute: str) -> FloatArray:
         """One attribute of all joints, (n_joints,): `robot.column("effort_limit")`."""

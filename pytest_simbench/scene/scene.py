@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import combinations
@@ -11,6 +12,7 @@ from pytest_simbench.scene.checks import (
     RESERVED,
     SceneError,
     Wire,
+    check_choice,
     check_name,
     check_number,
     check_numbers,
@@ -107,11 +109,8 @@ class Scene(Wire):
         check_numbers(self.room, 3, f"the room [m] of scene {self.name!r}", 0.0, above=True)
         what = f"the ground's restitution in scene {self.name!r}"
         check_number(self.ground_restitution, what, 0.0, 1.0)
-        if self.friction_rule not in RULES:
-            raise SceneError(
-                f"scene {self.name!r}: there is no rule {self.friction_rule!r} for the friction of "
-                f"two surfaces; there are {', '.join(RULES)}"
-            )
+        what = f"the rule of scene {self.name!r} for the friction of two surfaces"
+        check_choice(self.friction_rule, what, [*RULES])
         names = [body.name for body in self.bodies]
         for name in names:
             if name.lower() in RESERVED:
@@ -149,6 +148,17 @@ class Scene(Wire):
                     f"scene {self.name!r}: {a.name!r} and {b.name!r} overlap by "
                     f"{1000 * depth:.1f} mm; move one of them"
                 )
+
+    @property
+    def arm(self) -> Robot:
+        """The robot.
+
+        Raises:
+            SceneError: it has none.
+        """
+        if self.robot is None:
+            raise SceneError(f"scene {self.name!r} has no robot")
+        return self.robot
 
     @cached_property
     def free_bodies(self) -> tuple[Body, ...]:
@@ -219,6 +229,12 @@ class Scene(Wire):
         raise KeyError(
             f"no body {name!r} in scene {self.name!r}; it has {[b.name for b in self.bodies]}"
         )
+
+    def with_frictions(self, of: Callable[[float], float]) -> Scene:
+        """The same scene, the friction of each surface changed."""
+        bodies = tuple(body.with_friction(of(body.friction)) for body in self.bodies)
+        robot = self.robot and replace(self.robot, friction=of(self.robot.friction))
+        return replace(self, bodies=bodies, robot=robot, ground_friction=of(self.ground_friction))
 
     def with_body(self, body: Body) -> Scene:
         """The same scene with one body replaced by its namesake."""

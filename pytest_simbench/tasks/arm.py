@@ -83,9 +83,7 @@ class Arm:
         speeds: Speeds | None = None,
         scale: float = 1.0,
     ) -> None:
-        robot = world.scene.robot
-        if robot is None:
-            raise ValueError(f"scene {world.scene.name!r} has no robot")
+        robot = world.scene.arm
         self.world = world
         self.gripper = robot.gripper
         self.rng = rng
@@ -96,7 +94,7 @@ class Arm:
             self.grasp = grasp_of(robot, CUBE_SIZE * scale, scale)
             self.planning = PlanningScene(self.model, world.scene, scale)
             self.planner = MotionPlanner(self.model, self.planning, rng, world.scene.gravity)
-        self.home = self.arm = robot.column("initial_position")[: self.model.arm]
+        self.home = self.arm = self.model.home
         self.fingers = self.gripper.opened
         self.held: str | None = None
         self._released: tuple[str, ...] = ()

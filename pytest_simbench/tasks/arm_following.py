@@ -65,10 +65,6 @@ motions began after the first one [s], and the angles that the joints had at res
 first row is where the arm stood before. Joints 5 and 6 were not commanded."""
 
 
-SMALLEST = 2
-"""Runs of the smallest version, one of free motion and one with a push."""
-
-
 @dataclass(frozen=True)
 class ArmFollowing(MicoTask):
     """Give the simulated arm the commands of the real one.
@@ -79,6 +75,7 @@ class ArmFollowing(MicoTask):
     """
 
     name: ClassVar[str] = "arm_following"
+    smallest: ClassVar[int | None] = 2  # one of free motion and one with a push
     references: ClassVar[Mapping[str, float]] = {"hand_error": 0.0, "rest_error": 0.0}
     commands: ClassVar[Mapping[str, tuple[Command, ...]]] = COMMANDS
     initial: ClassVar[Mapping[str, tuple[float, ...]]] = dict.fromkeys(COMMANDS, (0.0,) * 6)
@@ -101,9 +98,6 @@ class ArmFollowing(MicoTask):
         """The runs that repetitions go through: free motion and pushes take turns."""
         both = (self.runs.of(experiment, self.half) for experiment in (FREE, PUSH))
         return tuple(run for pair in zip(*both, strict=False) for run in pair)[: self.most]
-
-    def smoke(self) -> ArmFollowing:
-        return replace(self, most=SMALLEST)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         run = self.real(seed)

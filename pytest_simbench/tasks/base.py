@@ -93,7 +93,7 @@ class Task(ABC):
     """
 
     name: ClassVar[str]
-    study_timeout: ClassVar[float]
+    study_timeout: ClassVar[float] = 600.0
     references: ClassVar[Mapping[str, float]] = {}
     counted: ClassVar[str] = ""
     moments: ClassVar[tuple[Moment, ...]] = ()

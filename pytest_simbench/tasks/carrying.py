@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -39,6 +39,7 @@ from pytest_simbench.scene import (
     Trajectory,
     principal,
 )
+from pytest_simbench.scene.checks import check_choice
 from pytest_simbench.tasks.arm import LostBody
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task, distance
 from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
@@ -76,7 +77,6 @@ class Carrying(Task):
     """
 
     name: ClassVar[str] = "carrying"
-    study_timeout: ClassVar[float] = 600.0
     counted: ClassVar[str] = "things held"
     moments: ClassVar[tuple[Moment, ...]] = (Moment("before the way", "carry"),)
 
@@ -84,6 +84,9 @@ class Carrying(Task):
     load: float = 0.8
     still: float = 10.0
     robot: Robot | None = None
+
+    def __post_init__(self) -> None:
+        check_choice(self.shape, f"the shape of {self.name}", get_args(Shape))
 
     @property
     def arm(self) -> Robot:
@@ -129,11 +132,10 @@ class Carrying(Task):
         robot, rng = model.robot, np.random.default_rng(0)
         if not model.has_parallel_fingers:
             return f"robot {robot.name!r} has no two parallel fingers, so no squeeze [N] is known"
-        home = robot.column("initial_position")[: model.arm]
         try:
             tools = [grip.tool for grip in grips(robot, self.thing(Pose()))]
             planning = PlanningScene(model, Scene(self.name, (), robot))
-            found = choose(planning, tools, APPROACH, home, home, rng)
+            found = choose(planning, tools, APPROACH, model.home, model.home, rng)
             inverse_kinematics(model, found.tool.translated(y=WAY, z=APPROACH), found.above, rng)
         except PlanningError as error:
             return f"robot {robot.name!r} cannot carry the {self.shape}: {error}"

@@ -55,7 +55,6 @@ class GoalTask(Task):
         robot: None: the Panda.
     """
 
-    study_timeout: ClassVar[float] = 600.0
     shares_worker: ClassVar[bool] = True
     counted: ClassVar[str] = "goals reached"
     references: ClassVar[Mapping[str, float]] = {"success": 1.0, "distance": 0.0}

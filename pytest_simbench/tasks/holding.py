@@ -50,7 +50,7 @@ class Holding(OnJoints):
     def commands(self, seed: int) -> tuple[FloatArray, FloatArray]:
         """What the drives are told: positions, (n_joints,) [rad or m], and efforts [N m or N]."""
         start = self.start(seed)
-        written, none = self.robot.column("initial_position"), np.zeros(len(self.joints))
+        written, none = self.world.arm.column("initial_position"), np.zeros(len(self.joints))
         if start is None:
             return written, none
         targets = start.targets or start.positions

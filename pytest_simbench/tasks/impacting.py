@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -28,9 +28,6 @@ has ended, and the real square is within its arc of 36 ms."""
 
 FRICTION, RESTITUTION = 0.12, 0.45
 """What suits Poisson's impact law best on the impacts that are not held out (docs/reality.md)."""
-
-SMALLEST = 5
-"""Impacts of the smallest version."""
 
 MASS = 0.1
 """[kg]. The source has none, and none is needed: it cancels."""
@@ -59,6 +56,7 @@ class Impacting(MeasuredTask[Impact]):
 
     name: ClassVar[str] = "impacting"
     data: ClassVar[str] = square.NAME
+    smallest: ClassVar[int | None] = 5
     references: ClassVar[Mapping[str, float]] = {"velocity_error": 0.0, "relative_error": 0.0}
 
     impacts: Impacts
@@ -81,9 +79,6 @@ class Impacting(MeasuredTask[Impact]):
     def chosen(self) -> tuple[Impact, ...]:
         """The impacts that repetitions go through, in the order of their numbers."""
         return self.impacts.half(self.half)[: self.most]
-
-    def smoke(self) -> Impacting:
-        return replace(self, most=SMALLEST)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         impact = self.real(seed)

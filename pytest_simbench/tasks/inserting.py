@@ -19,7 +19,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Body, Box, Cylinder, Pose, Robot, Scene
+from pytest_simbench.scene.checks import check_choice
 from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.tasks.arm import LostBody
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task
@@ -81,7 +82,6 @@ class Inserting(Task):
     """
 
     name: ClassVar[str] = "inserting"
-    study_timeout: ClassVar[float] = 600.0
     counted: ClassVar[str] = "pegs inserted"
     moments: ClassVar[tuple[Moment, ...]] = (Moment("before the insertion", "insert"),)
     references: ClassVar[Mapping[str, float]] = {"inserted": 1.0, "overlap": 0.0}
@@ -91,6 +91,9 @@ class Inserting(Task):
     depth: float = 0.025
     stiffness: float = 1000.0
     robot: Robot | None = None
+
+    def __post_init__(self) -> None:
+        check_choice(self.section, f"the section of {self.name}", get_args(Section))
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -129,12 +132,11 @@ class Inserting(Task):
         hit the hole."""
         robot, rng = self.robot or panda(), np.random.default_rng(0)
         model = RobotModel(robot)
-        home = robot.column("initial_position")[: model.arm]
         try:
             grip = grips(robot, self.peg(Pose()))[0]
             for x, y in (PEG, HOLE):
                 above = Pose.at(x, y, grip.tool.position[2] + APPROACH)
-                inverse_kinematics(model, tool_over(above, grip.tool.yaw), home, rng)
+                inverse_kinematics(model, tool_over(above, grip.tool.yaw), model.home, rng)
             softened(robot, self.stiffness)
         except PlanningError as error:
             return f"robot {robot.name!r} cannot insert the {self.section} peg: {error}"
@@ -270,17 +272,11 @@ def softened(robot: Robot, stiffness: float) -> Robot:
     Raises:
         PlanningError: it does not reach the hole.
     """
-    model, names = RobotModel(robot), {joint.name for joint in robot.arm_joints}
-    home = robot.column("initial_position")[: model.arm]
+    model = RobotModel(robot)
     tool = tool_over(Pose.at(*HOLE, HIGH + LONG / 2), 0.0)
-    arm = inverse_kinematics(model, tool, home, np.random.default_rng(0))
+    arm = inverse_kinematics(model, tool, model.home, np.random.default_rng(0))
     level = model.tool_jacobian(arm)[:2]
     yielding = level**2 @ (1 / robot.column("stiffness")[: model.arm])
     share = stiffness * float(yielding.mean())
-    joints = tuple(
-        replace(joint, stiffness=share * joint.stiffness, damping=share * joint.damping)
-        if joint.name in names
-        else joint
-        for joint in robot.joints
-    )
-    return replace(robot, joints=joints)
+    names = (joint.name for joint in robot.arm_joints)
+    return robot.scaled(*names, stiffness=share, damping=share)

@@ -223,11 +223,11 @@ def cannot_handle(
         )
     aside = Pose.at(0.0, -grasp_of(robot, size, scale).beside, 0.0)
     planning = PlanningScene(model, Scene("reach", tuple(fixed), robot), scale)
-    home, rng = robot.column("initial_position")[: model.arm], np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     for place in places:
         tools = [tool * aside for tool in top_down_grasps(place)]
         try:
-            choose(planning, tools, APPROACH * scale, home, home, rng)
+            choose(planning, tools, APPROACH * scale, model.home, model.home, rng)
         except PlanningError as error:
             x, y, z = place.position
             return (

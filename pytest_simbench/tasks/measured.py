@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import fields
-from typing import Any, ClassVar, Generic, TypeVar
+from dataclasses import fields, replace
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from pytest_simbench.data.measured import Measured, MeasuredMotion
 from pytest_simbench.tasks.base import Task
@@ -15,11 +15,16 @@ M = TypeVar("M", bound=MeasuredMotion)
 
 class MeasuredTask(Task, Generic[M]):
     """A task against the measured data of that name. Its start is not disturbed: there is one truth
-    for one start."""
+    for one start.
+
+    Attributes:
+        smallest: how many motions its smallest version goes through, where it has a field `most`.
+    """
 
     study_timeout: ClassVar[float] = 300.0
     shares_worker: ClassVar[bool] = True
     data: ClassVar[str]
+    smallest: ClassVar[int | None] = None
 
     @property
     @abstractmethod
@@ -30,6 +35,9 @@ class MeasuredTask(Task, Generic[M]):
     def repetitions(self) -> int:
         """Each motion once."""
         return len(self.chosen)
+
+    def smoke(self) -> Self:
+        return replace(self, most=self.smallest) if self.smallest else self  # type: ignore[type-var]
 
     def sample(self, seed: int) -> tuple[str, int]:
         return self.data, self.real(seed).number

@@ -18,6 +18,7 @@ from pytest_simbench.client.world import World
 from pytest_simbench.description.urdf import Link
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Compound, ConvexMesh, Pose, Scene, principal
+from pytest_simbench.scene.checks import check_count
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task
 from pytest_simbench.tasks.resting import RESTLESS, rates, rest
 from pytest_simbench.tasks.settling import tilted
@@ -52,7 +53,6 @@ class Nesting(Task):
     """
 
     name: ClassVar[str] = "nesting"
-    study_timeout: ClassVar[float] = 600.0
     counted: ClassVar[str] = "bowls nested"
     moments: ClassVar[tuple[Moment, ...]] = (Moment("before they fall", "fall"),)
     references: ClassVar[Mapping[str, float]] = {
@@ -61,6 +61,9 @@ class Nesting(Task):
 
     bowls: int = 4
     settle: float = 3.0
+
+    def __post_init__(self) -> None:
+        check_count(self.bowls, f"the number of bowls of {self.name}")
 
     @property
     def metrics(self) -> tuple[Metric, ...]:

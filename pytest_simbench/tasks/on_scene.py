@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pytest_simbench.client.world import World
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.records.metrics import RESOLUTIONS, Metric
-from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Robot, Scene, SceneError, Start
+from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene, SceneError, Start
 from pytest_simbench.tasks.base import Jitter, Task, distance
 
 
@@ -28,7 +28,6 @@ class OnScene(Task):
         world: the scene, of a file (`scene_file`) or made by hand.
     """
 
-    study_timeout: ClassVar[float] = 600.0
     shares_worker: ClassVar[bool] = True
 
     world: Scene
@@ -68,11 +67,6 @@ class OnJoints(OnScene):
             )
 
     @property
-    def robot(self) -> Robot:
-        assert self.world.robot is not None  # else it has no joints
-        return self.world.robot
-
-    @property
     def joints(self) -> tuple[str, ...]:
         return () if self.world.robot is None else self.world.robot.joint_names
 
@@ -85,7 +79,7 @@ class OnJoints(OnScene):
     def kinds(self) -> Mapping[str, tuple[NDArray[np.bool_], float, str]]:
         """Which of the measured joints are hinges and which are sliders, (n_joints,), where there
         are such, the factor from rad or m to the unit in which they are measured, and that unit."""
-        kinds = {joint.name: joint.kind for joint in PreparedRobot(self.robot).joints}
+        kinds = {joint.name: joint.kind for joint in PreparedRobot(self.world.arm).joints}
         own = [kinds[name] if name in self.measured else "" for name in self.joints]
         found = {
             "hinges": (np.array([kind == "revolute" for kind in own]), 180 / np.pi, "deg"),

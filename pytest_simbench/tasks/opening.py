@@ -35,6 +35,7 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, FloatArray, Gripper, Joint, Pose, Robot, Scene, Trajectory
+from pytest_simbench.scene.checks import check_number
 from pytest_simbench.scene.robot import FASTEST, FREE
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task
 from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
@@ -116,7 +117,6 @@ class Opening(Task):
     """
 
     name: ClassVar[str] = "opening"
-    study_timeout: ClassVar[float] = 600.0
     counted: ClassVar[str] = "drawers opened"
     moments: ClassVar[tuple[Moment, ...]] = (Moment("before the pull", "pull"),)
 
@@ -126,6 +126,10 @@ class Opening(Task):
     speed: float = 0.05
     rest: float = 2.0
     robot: Robot | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("friction", "mass", "way", "speed"):
+            check_number(getattr(self, name), f"the {name} of {self.name}", 0.0, above=True)
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -167,12 +171,11 @@ class Opening(Task):
                 f"the fingers of robot {robot.name!r} press with {robot.gripper.squeeze:g} N each, "
                 f"and a pull of {self.friction:g} N opens them"
             )
-        home = robot.column("initial_position")[: model.arm]
         try:
             for x in (0.0, -self.way):
                 tool = grips(robot, _handle(Pose.at(*PLACE).translated(x)))[0].tool
                 for z in (0.0, APPROACH):
-                    inverse_kinematics(model, tool.translated(z=z), home, rng)
+                    inverse_kinematics(model, tool.translated(z=z), model.home, rng)
         except PlanningError as error:
             return f"robot {robot.name!r} cannot open the drawer: {error}"
         return None
@@ -262,9 +265,7 @@ def _out(world: World) -> float:
 
 def _place(world: World) -> Pose:
     """Of the handle's middle: the drawer's frame."""
-    robot = world.scene.robot
-    assert robot is not None  # see `scene`
-    return link_poses(PreparedRobot(robot), world.joints[0])[DRAWER]
+    return link_poses(PreparedRobot(world.scene.arm), world.joints[0])[DRAWER]
 
 
 def _tool(world: World, hand: Manipulator) -> FloatArray:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pytest_simbench.client.world import World
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Compound, FloatArray, Pose, Scene, Sphere
+from pytest_simbench.scene.checks import check_count
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task
 
 RADIUS, MASS = 0.008, 0.005
@@ -61,7 +62,6 @@ class Pouring(Task):
     """
 
     name: ClassVar[str] = "pouring"
-    study_timeout: ClassVar[float] = 600.0
     counted: ClassVar[str] = "balls in the tray"
     moments: ClassVar[tuple[Moment, ...]] = (Moment("before the pouring", "pour"),)
     references: ClassVar[Mapping[str, float]] = {"in_tray": 1.0, "leaked": 0.0}
@@ -69,6 +69,9 @@ class Pouring(Task):
     balls: int = 30
     tilt: float = math.radians(150.0)
     settle: float = 2.0
+
+    def __post_init__(self) -> None:
+        check_count(self.balls, f"the number of balls of {self.name}")
 
     @property
     def metrics(self) -> tuple[Metric, ...]:

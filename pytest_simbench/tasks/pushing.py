@@ -77,7 +77,6 @@ class Pushing(Task):
     """
 
     name: ClassVar[str] = "pushing"
-    study_timeout: ClassVar[float] = 600.0
     counted: ClassVar[str] = "blocks pushed"
     moments: ClassVar[tuple[Moment, ...]] = (Moment("before the push", "push"),)
 
@@ -169,14 +168,12 @@ class Pushing(Task):
 
     def problem(self) -> str | None:
         """The way is out of reach."""
-        robot = self.arm
+        robot, rng = self.arm, np.random.default_rng(0)
         model = RobotModel(robot)
-        home = robot.column("initial_position")[: model.arm]
         first, *others = self.tools()
+        over = first.translated(z=APPROACH * self.scale)
         try:
-            above = inverse_kinematics(
-                model, first.translated(z=APPROACH * self.scale), home, np.random.default_rng(0)
-            )
+            above = inverse_kinematics(model, over, model.home, rng)
             tool_path(model, inverse_kinematics(model, first, above), others)
         except Unreachable as error:
             return f"robot {robot.name!r} cannot push the block: {error}; place its base elsewhere"

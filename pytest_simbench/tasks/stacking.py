@@ -21,6 +21,7 @@ from pytest_simbench.motion.model import grasping_scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Robot, Scene
+from pytest_simbench.scene.checks import check_count
 from pytest_simbench.tasks.arm import FULL_SPEED, LostBody, Speeds
 from pytest_simbench.tasks.base import (
     CUBE_SIZE,
@@ -105,6 +106,10 @@ class Stacking(Task):
     settle: float = 60.0
     full_wait: bool = False
     robot: Robot | None = None
+
+    def __post_init__(self) -> None:
+        check_count(self.towers, f"the number of towers of {self.name}", len(TOWERS))
+        check_count(self.levels, f"the number of levels of {self.name}")
 
     @cached_property
     def arm(self) -> Robot:

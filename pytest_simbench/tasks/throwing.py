@@ -92,7 +92,6 @@ class Throwing(Task):
     """
 
     name: ClassVar[str] = "throwing"
-    study_timeout: ClassVar[float] = 600.0
     counted: ClassVar[str] = "cubes moved"
     moments: ClassVar[tuple[Moment, ...]] = (
         Moment("in the grip", "wind up"),

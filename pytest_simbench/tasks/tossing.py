@@ -8,7 +8,7 @@ Posa, RA-L 2022, arXiv 2110.00541). docs/reality.md has what was published.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -23,9 +23,6 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, FloatArray, Scene
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from pytest_simbench.tasks.measured import MeasuredTask
-
-SMALLEST = 5
-"""Tosses of the smallest version."""
 
 ACRYLIC = (0.25, 0.45, 0.80, 1.0)
 
@@ -48,6 +45,7 @@ class Tossing(MeasuredTask[Toss]):
 
     name: ClassVar[str] = "tossing"
     data: ClassVar[str] = cube.NAME
+    smallest: ClassVar[int | None] = 5
     references: ClassVar[Mapping[str, float]] = {"position_error": 0.0, "rotation_error": 0.0}
 
     tosses: Tosses
@@ -69,9 +67,6 @@ class Tossing(MeasuredTask[Toss]):
     def chosen(self) -> tuple[Toss, ...]:
         """The tosses that repetitions go through, in the order of their numbers."""
         return self.tosses.half(self.half)[: self.most]
-
-    def smoke(self) -> Tossing:
-        return replace(self, most=SMALLEST)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         toss = self.real(seed)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from pytest_simbench.testing import (  # noqa: F401  they register their checks
     acting,
+    asking,
     contract,
     drives,
     dynamics,

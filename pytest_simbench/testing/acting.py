@@ -9,8 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pytest_simbench.laws.free import AxialForce, AxialTorque
-from pytest_simbench.laws.sliding import BeltSpeed
 from pytest_simbench.laws.sticking import slab_on
 from pytest_simbench.scene import Box, Compound, Pose, Scene, Wrench
 from pytest_simbench.scene.pair_friction import combined
@@ -19,22 +17,8 @@ from pytest_simbench.simulator import Capability
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import check
 from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS
-from pytest_simbench.testing.subject import Subject, asked, require, require_close
+from pytest_simbench.testing.subject import Subject, require, require_close
 from pytest_simbench.worker.stepping import prescribed
-
-
-@check()
-def force_acts_for_its_time(subject: Subject) -> None:
-    """A rod without weight, pulled by F for 0.4 s, has v = F t / m from then on: within 0.1 %. A
-    force that acts for a step too long gives more than that."""
-    asked(subject, AxialForce(), within=1e-3)
-
-
-@check()
-def torque_acts_for_its_time(subject: Subject) -> None:
-    """A lying rod under a torque T about its axis, which is the world's x, has omega = T t / I in
-    the same way."""
-    asked(subject, AxialTorque(), within=3.2e-3)
 
 
 @check()
@@ -64,13 +48,6 @@ def moves_as_prescribed(subject: Subject) -> None:
             require_close(f"distance of the {body.name} from its place", moved, 0.0, limit, "")
             off = float(np.abs(row[7:] - law[7:]).max())
             require_close(f"error of the {body.name}'s velocity", off, 0.0, 2e-3 * speed, "")
-
-
-@check()
-def belt_carries(subject: Subject) -> None:
-    """A box laid on a belt of 0.8 m/s slips until it goes with it, as friction has it: after 0.6 s
-    it has gone 0.4 m, within 2 %."""
-    asked(subject, BeltSpeed(), within=0.008)
 
 
 def _told(subject: Subject, scene: Scene, loads: dict[tuple[str, str], float]) -> None:

@@ -27,11 +27,7 @@ def static_hold(subject: Subject) -> None:
         q = world.joints[0]
     arm = len(robot.arm_joints)
     sag = float(np.abs(start - q)[:arm].max())
-    declared = any(
-        deviation.excuses(f"joint/{robot.joints[0].name}/stiffness")
-        for deviation in subject.cls.info.deviations
-    )
-    if declared and sag <= 5e-3:
+    if sag <= 5e-3 and subject.excused(f"joint/{robot.joints[0].name}/stiffness"):
         return
     held = (robot.column("stiffness") * (start - q))[:arm]
     law = gravity_effort(robot, q)[:arm]
@@ -152,7 +148,7 @@ def weak_joint_sags(subject: Subject) -> None:
     name = robot.joints[index].name
     moved = []
     for limit in (robot.joints[index].effort_limit, 0.1 * float(load[index])):
-        weak = scenes.with_joint(robot, name, effort_limit=limit)
+        weak = robot.with_joints(name, effort_limit=limit)
         with subject.world(scenes.arm_alone(weak)) as world:
             world.wait(0.5)
             moved.append(abs(float(world.joints[0, index] - q[index])))
@@ -197,8 +193,7 @@ def grip_holds(subject: Subject) -> None:
 
 def has_armature(subject: Subject) -> bool:
     """Whether the engine has rotor inertia, which an adapter may declare to lack."""
-    name = f"joint/{subject.arm.joints[0].name}/armature"
-    return not any(deviation.excuses(name) for deviation in subject.cls.info.deviations)
+    return subject.excused(f"joint/{subject.arm.joints[0].name}/armature") is None
 
 
 def joint_momentum(robot: Robot, q: FloatArray, v: FloatArray, armature: bool) -> FloatArray:

@@ -55,7 +55,7 @@ def _falling_arm(subject: Subject, rng: np.random.Generator) -> tuple[Robot, Flo
         robot = scenes.at_random(scenes.lifted(subject.arm), rng)
         for joint in robot.arm_joints:
             limp = {"stiffness": 1e-3, "damping": 1e-3, "effort_limit": 1e-6}
-            robot = scenes.with_joint(robot, joint.name, **limp)
+            robot = robot.with_joints(joint.name, **limp)
         path, speeds = _fall(robot, has_armature(subject))
         limits = PreparedRobot(robot).limits
         low, high = np.array([limits[joint.name] for joint in robot.arm_joints]).T
@@ -88,7 +88,7 @@ def every_effort_limit_counts(subject: Subject) -> None:
     load = np.abs(gravity_effort(robot, q, gravity)[: len(robot.arm_joints)])
     strong = robot
     for joint, effort in zip(robot.arm_joints, load, strict=True):
-        strong = scenes.with_joint(strong, joint.name, effort_limit=1.25 * float(effort) + 0.1)
+        strong = strong.with_joints(joint.name, effort_limit=1.25 * float(effort) + 0.1)
     moved = _gives_way(subject, strong, gravity)
     for joint, value in zip(robot.arm_joints, moved, strict=True):
         require_close(f"motion of {joint.name} with 1.25 times the effort", value, 0, 0.01, "rad")
@@ -97,7 +97,7 @@ def every_effort_limit_counts(subject: Subject) -> None:
         if 0.3 * load[k] / inertia * _GIVING**2 / 2 < 4 * 0.02:
             _speeds_up(subject, robot, k)
             continue
-        weak = scenes.with_joint(strong, joint.name, effort_limit=0.7 * float(load[k]))
+        weak = strong.with_joints(joint.name, effort_limit=0.7 * float(load[k]))
         value = float(_gives_way(subject, weak, gravity)[k])
         require(
             value > 0.02,
@@ -111,7 +111,7 @@ def _speeds_up(subject: Subject, robot: Robot, k: int) -> None:
     seconds, name, start = 0.05, robot.joints[k].name, robot.column("initial_position")
     inertia = own_inertia(robot, start, k, has_armature(subject))
     limit = min(0.5, 2 * 0.3 * inertia / seconds**2)
-    robot = scenes.with_joint(robot, name, effort_limit=limit, stiffness=100.0, damping=1e-3)
+    robot = robot.with_joints(name, effort_limit=limit, stiffness=100.0, damping=1e-3)
     require_limit_reached(subject, robot, k, 1.0 if start[k] < 0 else -1.0, seconds)
 
 

@@ -88,14 +88,9 @@ def true_scene() -> Scene:
         Compound("stool", _stool(), Pose.at(-0.5, -0.5, 0.5, yaw=0.4), 0.5,
                  moments=(1.0e-3, 1.2e-3, 1.1e-3), friction=0.7),
     )  # fmt: skip
-    return Scene(
-        "full",
-        tuple(body.with_friction(0.7) for body in bodies),
-        robot=replace(scenes.arm(), friction=0.7),
-        gravity=(0.3, -0.2, -3.7),
-        ground_friction=0.7,
-        ground_restitution=0.6,
-    )
+    pull = (0.3, -0.2, -3.7)
+    scene = Scene("full", bodies, scenes.arm(), gravity=pull, ground_restitution=0.6)
+    return scene.with_frictions(lambda mu: 0.7)
 
 
 def _stool(aside: float = 0.0) -> tuple[Box, Box]:
@@ -114,33 +109,24 @@ def of_body(name: str, **values: Any) -> Plant:
 
 def of_robot(change: Callable[[Robot], Robot]) -> Plant:
     """Another robot."""
-    return lambda scene: replace(scene, robot=change(scenes.of_scene(scene)))
+    return lambda scene: replace(scene, robot=change(scene.arm))
 
 
-def of_joints(*names: str, farther: float = 0.0, **factors: float) -> Plant:
-    """Values of the joints' drives, multiplied; they start `farther` [rad]."""
-
-    def change(robot: Robot) -> Robot:
-        for joint in robot.joints:
-            if joint.name in names:
-                values = {key: factor * getattr(joint, key) for key, factor in factors.items()}
-                start = joint.initial_position + farther
-                robot = scenes.with_joint(robot, joint.name, initial_position=start, **values)
-        return robot
-
-    return of_robot(change)
+def of_joints(*names: str, **factors: float) -> Plant:
+    """Values of the joints' drives, multiplied."""
+    return of_robot(lambda robot: robot.scaled(*names, **factors))
 
 
 def with_own(joint: str, **values: float) -> Plant:
-    """What the joint does by itself, see `scene.Joint`."""
-    return of_robot(lambda robot: scenes.with_joint(robot, joint, **values))
+    """Other values of a joint, see `scene.Joint`."""
+    return of_robot(lambda robot: robot.with_joints(joint, **values))
 
 
 def edited(path: str, edit: Edit) -> Plant:
     """An element of the URDF, edited; the meshes come along."""
 
     def plant(scene: Scene) -> Scene:
-        robot = scenes.of_scene(scene)
+        robot = scene.arm
         root = ET.parse(keep(**content_of(robot))).getroot()
         element = root.find(path)
         if element is None:
@@ -229,7 +215,8 @@ def _text(values: FloatArray) -> str:
 def robot_faults(robot: Robot) -> dict[str, Fault]:
     """Faults of the middle joint of an arm, of the link that it moves, of the base and the
     fingers."""
-    first, middle = robot.arm_joints[0].name, robot.arm_joints[len(robot.arm_joints) // 2].name
+    first, driven = robot.arm_joints[0].name, robot.arm_joints[len(robot.arm_joints) // 2]
+    middle, farther = driven.name, driven.initial_position + 0.01
     children = {joint.name: joint.child for joint in PreparedRobot(robot).joints}
     moved, fingers = children[middle], robot.gripper.joints
     joint, link = f"joint[@name='{middle}']", f"link[@name='{moved}']"
@@ -270,7 +257,7 @@ def robot_faults(robot: Robot) -> dict[str, Fault]:
         "link_gravity": (f"{moved} feels half of gravity", f"{of_link}/gravity",
                          with_own(middle, gravity=0.5), None, "link_gravity"),
         "initial_position": (f"{middle} starts 10 mrad farther", f"{drive}/initial_position",
-                             of_joints(middle, farther=0.01)),
+                             with_own(middle, initial_position=farther)),
     }  # fmt: skip
     if fingers:
         twice = of_joints(*fingers, effort_limit=2.0)

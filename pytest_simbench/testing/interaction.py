@@ -10,7 +10,6 @@ import numpy as np
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.laws.free import rotation_of
 from pytest_simbench.laws.hands import close_command, gravity_effort, hold_command
-from pytest_simbench.laws.impact import DeadLanding
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene, Wrench
 from pytest_simbench.tasks.manipulator import Manipulator
@@ -18,7 +17,7 @@ from pytest_simbench.tasks.throw_analysis import Thrown
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import any_robot, check, grasping, throwing
 from pytest_simbench.testing.scenes import EDGE, GRAVITY, MASS, Approach, approaches, beside
-from pytest_simbench.testing.subject import Subject, asked, require, require_close
+from pytest_simbench.testing.subject import Subject, require, require_close
 
 _GRASP = 0.5
 """For how long the hand closes before anything is asked [s]."""
@@ -29,7 +28,7 @@ def squeeze_bounds_the_grip(subject: Subject) -> None:
     """Two fingers that press with F carry 2 mu F and no more: of what they can carry, a cube of
     0.6 times that weight stays (15 mm in 0.5 s), one of 1.3 times falls out (50 mm)."""
     force = 5.0
-    robot = scenes.squeezing(subject.arm, force)
+    robot = subject.arm.squeezing(force)
     moved = []
     for share in (0.6, 1.3):
         mass = share * 2 * robot.friction * force / GRAVITY
@@ -105,7 +104,7 @@ def held_weight_is_felt(subject: Subject) -> None:
     joint = int(np.argmax(cube_load * np.sign(arm_load)))
     limit = float(abs(arm_load[joint]) + abs(cube_load[joint]) / 2)
     name = robot.joints[joint].name
-    weak = scenes.with_joint(robot, name, effort_limit=limit)
+    weak = robot.with_joints(name, effort_limit=limit)
     held = scenes.grip(weak, mass, name="heavy grip")
     sags = []
     for scene in (replace(held, name="empty grip", bodies=()), held):
@@ -143,13 +142,6 @@ def _require_touch(subject: Subject, approach: Approach, places: FloatArray) -> 
     require_close(what, float(travelled.max()), approach.distance, allowed, "m")
 
 
-@check()
-def nothing_bounces(subject: Subject) -> None:
-    """A cube that falls flat upon the ground from 0.1 m rises again by at most a tenth of that
-    (restitution below 0.32)."""
-    asked(subject, DeadLanding(height=0.1), within=0.01)
-
-
 @check(robot=grasping)
 def pulled_grip_slips(subject: Subject) -> None:
     """Fingers that have held a cube for 0.5 s carry 2 mu F of a force along their pads, and no
@@ -158,7 +150,7 @@ def pulled_grip_slips(subject: Subject) -> None:
     where on them they press. Pulled with 1.25 of it the cube goes by more than an edge in 0.3 s. A
     hand that is glued to what it holds does not let it go."""
     force = 5.0
-    robot = scenes.squeezing(subject.arm, force)
+    robot = subject.arm.squeezing(force)
     scene = replace(scenes.grip(robot, name="pulled grip"), gravity=(0.0, 0.0, 0.0))
     along = RobotModel(robot).tool_pose(robot.column("initial_position")).rotation()[:, 2]
     ends = np.array([_GRASP, _GRASP + 0.3, _GRASP + 0.6])
@@ -230,7 +222,7 @@ def thrown_cube_flies_free(subject: Subject) -> None:
     start, goal = (np.array(rows) for rows in subject.arm.swing or ())
     robot = subject.arm
     for joint, value in zip(robot.arm_joints, start, strict=True):
-        robot = scenes.with_joint(robot, joint.name, initial_position=float(value))
+        robot = robot.with_joints(joint.name, initial_position=float(value))
     scene = scenes.grip(robot, name="throw")
     with subject.world(scene) as world:
         world.follow(close_command(scene, subject.timestep))

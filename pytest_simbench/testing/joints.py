@@ -98,7 +98,7 @@ def moves_by(
     `held`: see `mechanism`."""
     robot, part = mechanism(parts[0].name, *parts, **held), parts[0]
     if rotor:
-        robot = scenes.with_joint(robot, part.name, armature=rotor)
+        robot = robot.with_joints(part.name, armature=rotor)
     time, positions = moves(subject, robot, told)
     right = followed(law, time)
     fastest = float(np.abs(np.gradient(right, time)).max())
@@ -161,8 +161,7 @@ def joints_have_springs(subject: Subject) -> None:
     part = lever("sprung lever", spring=20.0, rest=-0.4)
     moves_by(subject, part, law=lambda q, v: (turning(q) + 20 * (-0.4 - q)) / ABOUT_AXIS)
     driven = slider("driven slider", spring=200.0, rest=0.1, stiffness=200.0, effort=STRONG)
-    excused = subject.cls.info.deviations
-    if not any(d.excuses(f"joint/{driven.name}/stiffness") for d in excused):
+    if not subject.excused(f"joint/{driven.name}/stiffness"):
         moves_by(subject, driven, law=lambda q, v: -G + (200 * (0.1 - q) - 200 * q) / MASS)
 
 
@@ -224,9 +223,8 @@ def rotors_are_heavy(subject: Subject) -> None:
     """With a rotor as heavy as the mass on it a slider falls half as fast. Skipped where an adapter
     declares that it has none."""
     part = slider("geared slider")
-    for deviation in subject.cls.info.deviations:
-        if deviation.excuses(f"joint/{part.name}/armature"):
-            pytest.skip(deviation.reason)
+    if reason := subject.excused(f"joint/{part.name}/armature"):
+        pytest.skip(reason)
     moves_by(subject, part, law=lambda q, v: -G / 2, rotor=MASS)
 
 

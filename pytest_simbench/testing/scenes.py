@@ -12,9 +12,6 @@ import numpy as np
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.shapes import DIRECTIONS, placed, shape_points
 from pytest_simbench.laws.hands import GAP, HELD, around
-from pytest_simbench.laws.hands import of_scene as of_scene
-from pytest_simbench.laws.hands import squeezing as squeezing
-from pytest_simbench.laws.hands import with_joint as with_joint
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import STANDARD_GRAVITY, Box, FloatArray, Pose, Robot, Scene, Vector3
@@ -84,7 +81,7 @@ def at_random(robot: Robot, rng: np.random.Generator) -> Robot:
     for joint in robot.joints:
         low, high = limits[joint.name]
         share = opening if joint.name in robot.gripper.joints else rng.uniform(0.1, 0.9)
-        robot = with_joint(robot, joint.name, initial_position=float(low + share * (high - low)))
+        robot = robot.with_joints(joint.name, initial_position=float(low + share * (high - low)))
     return robot
 
 

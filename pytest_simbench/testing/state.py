@@ -24,7 +24,7 @@ def busy_scene(robot: Robot) -> Scene:
 
 
 def _swing(scene: Scene, timestep: float, share: float) -> Trajectory:
-    robot = scenes.of_scene(scene)
+    robot = scene.arm
     start = robot.column("initial_position")
     goal = start + share
     goal[robot.finger_indices] = start[robot.finger_indices]

@@ -99,6 +99,10 @@ class Subject:
     def can(self, capability: Capability) -> bool:
         return capability in self.cls.info.capabilities
 
+    def excused(self, quantity: str) -> str | None:
+        """Why the adapter does not tell or have a quantity, as it declares; None: it does."""
+        return next((d.reason for d in self.cls.info.deviations if d.excuses(quantity)), None)
+
     def can_build(self, scene: Scene) -> None:
         """Skip the law when the scene has a robot and the adapter declares that it has none: as a
         deviation of every link, `Deviation("link/*", "mysim has no robots")`."""

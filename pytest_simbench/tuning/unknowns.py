@@ -147,8 +147,7 @@ def _changed(scene: Scene, kind: str, name: str, value: float) -> Scene:
         if kind == "mass" and body.moments is not None:
             change["moments"] = tuple(value / body.mass * moment for moment in body.moments)
         return scene.with_body(body.changed(**change))
-    robot = scene.robot
-    assert robot is not None  # else it is none of this scene
+    robot = scene.arm
     if kind in OF_BODIES:
         whole = replace(robot, friction=value) if kind == "friction" else _heavy(robot, name, value)
         return replace(scene, robot=whole)
@@ -156,8 +155,7 @@ def _changed(scene: Scene, kind: str, name: str, value: float) -> Scene:
     if kind == START:
         ends = PreparedRobot(robot).limits[name]
         of_joint = {"initial_position": float(np.clip(value, *ends))}
-    joints = tuple(replace(j, **of_joint) if j.name == name else j for j in robot.joints)
-    return replace(scene, robot=replace(robot, joints=joints))
+    return replace(scene, robot=robot.with_joints(name, **of_joint))
 
 
 def _heavy(robot: Robot, link: str, mass: float) -> Robot:

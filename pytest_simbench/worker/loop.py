@@ -121,8 +121,7 @@ def inside(scene: Scene, told: Row, period: float, policy: Mapping[str, Any]) ->
     made = _made(policy)
     goal = None if policy["goal"] is None else Pose.from_array(policy["goal"])
     sight = Sight(scene, goal=goal)
-    assert scene.robot is not None  # `Sight` has looked
-    points = SetPoints(scene.robot, told[0], told[2], period)
+    points = SetPoints(scene.arm, told[0], told[2], period)
 
     def answer(
         time: float, joints: FloatArray, told: Row, bodies: FloatArray

@@ -14,8 +14,7 @@ from pytest_simbench.cli.main import main
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.measure.watching import Step
-from tests.plugin.inner import importable
-from tests.plugin.planted import plant
+from tests.plugin.planted import offer, plant
 
 DRIVER = """
 import sys
@@ -38,21 +37,9 @@ BALL = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
 @pytest.fixture
 def index(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The page of a package index."""
-    environments = pytester.path / "environments"
-    found = plant(pytester.path, environments)
-    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(environments))
-    monkeypatch.setenv("PIP_INDEX_URL", found.as_uri())
-    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", (pytester.path / "none").as_uri())
-    importable(monkeypatch, pytester.path / "site")
     pytester.makepyfile(driver=DRIVER)
     (pytester.path / "ball.xml").write_text(BALL)
-    return found / "planted-engine" / "index.html"
-
-
-def offer(index: Path, *versions: str) -> None:
-    """Have the index hold these releases alone."""
-    names = [f"planted_engine-{version}-py3-none-any.whl" for version in versions]
-    index.write_text("".join(f'<a href="{n}">{n}</a>\n' for n in names))
+    return plant(pytester, monkeypatch)
 
 
 def test_what_is_new_is_compared_with_what_was_seen(pytester: pytest.Pytester, index: Path) -> None:

@@ -20,8 +20,9 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import describe_robot, expected
 from pytest_simbench.experiment.policy_file import read_policies
 from pytest_simbench.motion.registry import find
-from pytest_simbench.tasks import Reaching, Stacking
+from pytest_simbench.tasks import Holding, Reaching, Stacking
 from tests.cluster.test_pool import A, Told
+from tests.tasks.scripted_scene import SCENE
 from tests.tiny import Falling
 
 
@@ -43,6 +44,11 @@ def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
     command = [sys.executable, "-P", "-c", code]
     out = subprocess.run(command, input=packed, capture_output=True, check=True, cwd="/").stdout
     assert out.decode().strip() == "Falling(duration=0.25) ['landed']"
+
+
+def test_a_task_whose_robot_is_its_scenes_travels_with_that(case: Case) -> None:
+    packed = Job.of(Experiment(case, Holding(SCENE))).pack().data
+    assert Job.unpack(packed or b"").task == Holding(SCENE)
 
 
 @pytest.mark.parametrize("name", ["still", "wrapped"])

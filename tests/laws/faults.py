@@ -8,7 +8,7 @@ from typing import Any
 
 from pytest_simbench.scene import Body, Box, Pose, Scene
 from pytest_simbench.testing.faults import Plant as Fault
-from pytest_simbench.testing.faults import edited, of_joints, of_robot, put
+from pytest_simbench.testing.faults import edited, of_robot, put
 
 
 def heavier(scene: Scene) -> Scene:
@@ -25,17 +25,7 @@ def turned(scene: Scene) -> Scene:
 
 def rougher(factor: float) -> Fault:
     """All friction is another one; where there is none, it is 0.2."""
-
-    def change(scene: Scene) -> Scene:
-        def of(mu: float) -> float:
-            return factor * mu or 0.2
-
-        bodies = tuple(body.with_friction(of(body.friction)) for body in scene.bodies)
-        robot = scene.robot and replace(scene.robot, friction=of(scene.robot.friction))
-        ground = of(scene.ground_friction)
-        return replace(scene, bodies=bodies, robot=robot, ground_friction=ground)
-
-    return change
+    return lambda scene: scene.with_frictions(lambda mu: factor * mu or 0.2)
 
 
 def bodies(change: Callable[[Body], Body], which: str = "") -> Fault:
@@ -83,7 +73,7 @@ def sized(x: float, y: float, z: float, which: str = "") -> Fault:
 
 def drives(**factors: float) -> Fault:
     """The drives have other gains or limits."""
-    return lambda scene: of_joints(*scene.robot.joint_names, **factors)(scene)
+    return of_robot(lambda robot: robot.scaled(*robot.joint_names, **factors))
 
 
 def step(scene: Scene) -> Scene:

@@ -98,7 +98,7 @@ def test_a_law_says_where_it_comes_from_and_what_it_allows(law: Law) -> None:
 
 def test_columns_are_read_between_samples() -> None:
     t, none = np.array([0.1, 0.2]), np.empty((2, 0))
-    seen = Watched(0.1, t, none, none)
+    seen = Watched(0.1, t, none, none, none)
     values = np.array([[0.0, 10.0], [1.0, 30.0]])
     assert seen.at(0.15, values) == pytest.approx([0.5, 20.0])
     assert seen.at(0.15, values[:, 1]) == pytest.approx(20.0)

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from pytest_simbench.measure import bisection
 from pytest_simbench.measure.bisection import between, first_worse, like_the_bad_one, steps
 from pytest_simbench.measure.gate import run_gate, side_by_side
 from pytest_simbench.measure.history import histories
 from pytest_simbench.measure.limits import parse_limits
 from pytest_simbench.measure.results import ResultSet
+from pytest_simbench.measure.speed import compared
 from pytest_simbench.records.record import Record
 from tests.records.build import METRICS, failed, record
 
@@ -158,7 +158,7 @@ def test_a_simulators_name_in_a_folder_or_a_parameter_hides_no_comparison() -> N
 def test_a_release_is_worse_by_one_value_that_all_repetitions_would_have() -> None:
     kept = [record(1, metrics={"placed": placed}).noting(sole=True) for placed in (1.0, 0.9)]
     sides = (ResultSet([each], METRICS) for each in kept)
-    assert bisection.difference(PLACED, *sides).p_value == 0.0
+    assert compared(PLACED, *sides)[0].p_value == 0.0
 
 
 def test_values_that_differ_are_not_one_whatever_the_simulator_claims() -> None:

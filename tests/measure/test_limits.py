@@ -10,14 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.measure.limits import (
-    CRASHED,
     Limit,
     LimitError,
     check_gate,
     check_threshold,
     parse_limits,
 )
-from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric, UnknownMetric
 from tests.records.build import METRICS
 
 PLACED, _, ERROR, _ = METRICS

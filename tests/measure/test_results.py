@@ -12,7 +12,7 @@ import pytest
 from pytest_simbench.measure.intervals import interval, proportion
 from pytest_simbench.measure.results import InconclusiveWarning, ResultSet
 from pytest_simbench.measure.verdicts import at_least
-from pytest_simbench.records.metrics import Metric, UnknownMetric
+from pytest_simbench.records.metrics import CRASHED, Metric, UnknownMetric
 from tests.records.build import METRICS, failed, record, records
 
 
@@ -58,7 +58,7 @@ def test_a_crashed_repetition_counts_with_the_worst_value_that_there_is(
     assert result.interval(metric).n == len(values)
     assert (len(result), len(result.ok), len(result.crashed)) == (5, 2, 2)
     assert result.failures == result.crashed
-    assert result.crashed_by_seed() == {1000: 0.0, 1001: 0.0, 1002: 1.0, 1003: 1.0}
+    assert result.by_seed(CRASHED) == {1000: 0.0, 1001: 0.0, 1002: 1.0, 1003: 1.0}
 
 
 @pytest.mark.parametrize(
@@ -144,7 +144,7 @@ def test_what_is_supported_passes_without_a_word(
     made = placed(*values, also=crashed)
     made.records += (record(30, status="interrupted"),)  # it counts as neither
     assert len(made.interrupted) == 1
-    assert made.crash_interval().n == len(values) + crashed
+    assert made.interval(CRASHED).n == len(values) + crashed
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         getattr(made, f"assert_{check}")(*given)
@@ -307,7 +307,7 @@ def test_an_interval_has_the_confidence_asked_for() -> None:
     result = placed(*GOOD, also=5)
     for level in (0.8, 0.95, 0.99):
         assert result.interval("placed", level) == interval([*GOOD, *[0.0] * 5], METRICS[0], level)
-        assert result.crash_interval(level) == proportion(5, 25, level)
+        assert result.interval(CRASHED, level) == proportion(5, 25, level)
     assert result.interval("placed") == result.interval("placed", 0.95)
 
 
@@ -331,7 +331,7 @@ def test_a_failure_without_a_cause_is_counted_and_told() -> None:
 def test_every_cause_is_a_failure(cause: str) -> None:
     result = ResultSet([*records("placed", [1.0] * 3), failed(3, cause)], METRICS)
     assert [record.seed for record in result.crashed] == [1003]
-    assert result.crash_interval().mean == 0.25
+    assert result.interval(CRASHED).mean == 0.25
     with pytest.raises(AssertionError, match=f"1 of 4 repetitions crashed: 1 x {cause} in settle"):
         result.assert_no_crashes()
     fine = placed(1.0, 1.0)

@@ -64,7 +64,7 @@ def test_links_are_as_far_from_cubes_as_the_scene_says(name: str) -> None:
     model = RobotModel(robot)
     planning = PlanningScene(model, scene)
     rng = np.random.default_rng(1)
-    home = robot.column("initial_position")[: model.arm]
+    home = model.home
     near = 0
     for _ in range(400):
         arm = home + rng.normal(0.0, 0.4, model.arm)

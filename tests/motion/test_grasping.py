@@ -92,7 +92,7 @@ def choices(name: str) -> list[str]:
     scene = Stacking(robot=robot).scene(2022, Jitter())
     model = RobotModel(robot)
     planning = PlanningScene(model, scene)
-    home = robot.column("initial_position")[: model.arm]
+    home = model.home
     rng, problems = np.random.default_rng(0), []
     for cube in scene.free_bodies:
         tools = top_down_grasps(cube.pose)

@@ -55,7 +55,7 @@ def test_five_joints_point_a_tool_down_with_any_yaw(yaw: float) -> None:
     robot = find("so101")
     model = RobotModel(robot)
     tool = tool_over(Pose.at(0.2, 0.05, 0.03), yaw)
-    near = robot.column("initial_position")[: model.arm]
+    near = model.home
     found = model.tool_pose(inverse_kinematics(model, tool, near, np.random.default_rng(0)))
     assert found.position == pytest.approx(tool.position, abs=1e-6)
     assert np.allclose(found.matrix(), tool.matrix(), atol=1e-4)

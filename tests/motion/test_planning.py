@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pytest_simbench.motion.collision import PlanningScene
-from pytest_simbench.motion.errors import InCollision
+from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import LIMITS, THROW_END, WIND_UP, panda
@@ -98,7 +98,7 @@ def test_other_cubes_are_obstacles(scene: Scene, planner: MotionPlanner) -> None
     touching = planner.scene.collision(at)
     assert "cube_11" in touching
     assert planner.scene.collision(at, ignored=["cube_11"], margin=False) is None
-    with pytest.raises(InCollision, match="goal in collision: .*cube_11"):
+    with pytest.raises(PlanningError, match="goal in collision: .*cube_11"):
         planner.move_to(READY, at, 0.035)
 
 
@@ -150,7 +150,7 @@ def test_a_path_touches_only_what_it_may() -> None:
     start = inverse_kinematics(MODEL, tool_over(Pose.at(0.38, 0.0, 0.3), 0.0), READY)
     poses = [tool_over(Pose.at(0.38 + 0.01 * k, 0.0, 0.3), 0.0) for k in range(1, 13)]
     planner.move_along(start, poses, 0.0, tool_speed=0.1, ignored=("block",))
-    with pytest.raises(InCollision, match=r"^path blocked: panda_\w+ and block$"):
+    with pytest.raises(PlanningError, match=r"^path blocked: panda_\w+ and block$"):
         planner.move_along(start, poses, 0.0, tool_speed=0.1)
 
 

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
+import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from textwrap import dedent
 from typing import Any
 
 import pytest
@@ -30,6 +35,43 @@ def no_traceback(result: pytest.RunResult) -> None:
     text = result.stdout.str() + result.stderr.str()
     assert "Traceback (" not in text
     assert "INTERNALERROR" not in text
+
+
+def run_pytest(
+    pytester: pytest.Pytester,
+    words: str = "",
+    *more: str,
+    ret: int | None = None,
+    **outcomes: int,
+) -> pytest.RunResult:
+    """An inner run, which has no traceback, and the exit code and outcomes that are given.
+
+    Args:
+        words: of the command line, separated by blanks.
+        more: further words, which may hold blanks.
+    """
+    result = pytester.runpytest_subprocess(*words.split(), *more)
+    no_traceback(result)
+    if ret is not None:
+        assert result.ret == ret, result.stdout.str() + result.stderr.str()
+    if outcomes:
+        result.assert_outcomes(**outcomes)
+    return result
+
+
+@contextmanager
+def run_before(
+    request: pytest.FixtureRequest, factory: pytest.TempPathFactory, test: str, words: str
+) -> Iterator[Path]:
+    """A folder in which pytest has run that test, for the tests of a whole module."""
+    folder = factory.mktemp("before")
+    (folder / "test_it.py").write_text(dedent(test))
+    outer = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST_XDIST")}
+    command = [sys.executable, "-m", "pytest", *words.split()]
+    environment = {**outer, "PYTHONPATH": str(request.config.rootpath)}
+    subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
+    yield folder
+    shutil.rmtree(folder)
 
 
 def usage_error(result: pytest.RunResult, *lines: str) -> None:

@@ -10,7 +10,9 @@ import json
 import sys
 from pathlib import Path
 
-from tests.plugin.inner import FALLING, distribution
+import pytest
+
+from tests.plugin.inner import FALLING, distribution, importable
 
 ADAPTER = """
 from dataclasses import replace
@@ -37,22 +39,28 @@ class Planted(MuJoCo):
 RELEASES = ("1.0", "1.1", "1.2", "1.3", "1.4", "1.5")
 
 
-def plant(folder: Path, environments: Path) -> Path:
-    """Make adapter, test, environments and a package index; returns the index.
-
-    Args:
-        folder: where pytest runs.
-        environments: of the simulators (`SIMBENCH_ENVIRONMENTS`).
-    """
+def plant(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Make adapter, test, environments and a package index, for inner runs; returns the page of the
+    index."""
+    folder, environments = pytester.path, pytester.path / "environments"
     site, index = folder / "site", folder / "index" / "planted-engine"
     (folder / "test_planted.py").write_text(FALLING)
     distribution(site, "planted-adapter", "planted = planted_adapter:Planted", ADAPTER)
     index.mkdir(parents=True)
-    names = [f"planted_engine-{version}-py3-none-any.whl" for version in RELEASES]
-    (index / "index.html").write_text("".join(f'<a href="{n}">{n}</a>\n' for n in names))
+    offer(index / "index.html", *RELEASES)
     for version in RELEASES:
         _environment(environments / f"planted=={version}", version)
-    return index.parent
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(environments))
+    monkeypatch.setenv("PIP_INDEX_URL", index.parent.as_uri())
+    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", (folder / "none").as_uri())
+    importable(monkeypatch, site)
+    return index / "index.html"
+
+
+def offer(index: Path, *versions: str) -> None:
+    """Have the index hold these releases alone."""
+    names = [f"planted_engine-{version}-py3-none-any.whl" for version in versions]
+    index.write_text("".join(f'<a href="{n}">{n}</a>\n' for n in names))
 
 
 def _environment(folder: Path, version: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.plugin.inner import no_traceback
+from tests.plugin.inner import run_pytest
 
 HEAD = """
 import math
@@ -67,11 +67,11 @@ def test_wrong_arguments_and_settings(pytester: pytest.Pytester) -> None:
         for number, value in enumerate(SETTINGS)
     ]
     pytester.makepyfile("\n".join([HEAD, *calls, *classes]))
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=out")
-    result.assert_outcomes(failed=len(TESTS), errors=len(SETTINGS))
+    result = run_pytest(
+        pytester, "--sim=mujoco --sim-output=out", failed=len(TESTS), errors=len(SETTINGS)
+    )
     settings = [f"the fixture sim_settings{message}" for message in SETTINGS.values()]
     result.stdout.fnmatch_lines([*settings, *(f"{message}*" for message in TESTS.values())])
-    no_traceback(result)
     assert "Error:" not in result.stdout.str() + result.stderr.str()
     assert not (pytester.path / "out").exists()
 
@@ -101,7 +101,5 @@ class TestSettings:
         assert settings["noslip_iterations"] == 3
 """
     )
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=1")
-    result.assert_outcomes(failed=1, passed=2)
+    result = run_pytest(pytester, "--sim=mujoco --reps=1", failed=1, passed=2)
     result.stdout.fnmatch_lines(["repeat() is called for the task 'falling' a second time in one*"])
-    no_traceback(result)

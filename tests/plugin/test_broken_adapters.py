@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command import simbench
-from tests.plugin.inner import FALLING, distribution, importable, usage_error
+from tests.plugin.inner import FALLING, distribution, importable, run_pytest, usage_error
 
 GOOD = """
 from dataclasses import replace
@@ -66,11 +66,11 @@ def test_broken_adapters_end_no_other(pytester: pytest.Pytester, site: Path) -> 
     assert result.ret == 0
     result.stdout.fnmatch_lines([f"{name}: BROKEN: {text}" for name, text in said.items()])
     result.stdout.fnmatch_lines(["good: Good (*", "mujoco: MuJoCo (*"])
-    result = pytester.runpytest_subprocess("--collect-only", "-q")
+    result = run_pytest(pytester, "--collect-only -q")
     result.stdout.fnmatch_lines(["*::test_falling?good-headless?", "*?mujoco-headless?"])
     assert "broken" not in result.stdout.str().replace("test_broken", "")
-    pytester.runpytest_subprocess("--sim=good", "--reps=1").assert_outcomes(passed=1)
-    result = pytester.runpytest_subprocess("--sim=broken3")
+    run_pytest(pytester, "--sim=good --reps=1", passed=1)
+    result = run_pytest(pytester, "--sim=broken3")
     usage_error(result, f"ERROR: {said['broken3']}")
 
 
@@ -79,8 +79,7 @@ def test_all_skips_a_broken_one_with_its_reason(pytester: pytest.Pytester, site:
     pytester.makepyfile(
         FALLING.replace("def ", "import pytest\n@pytest.mark.only_sim('broken')\ndef ")
     )
-    result = pytester.runpytest_subprocess("--sim=all", "-rs")
-    result.assert_outcomes(skipped=1)
+    result = run_pytest(pytester, "--sim=all -rs", skipped=1)
     result.stdout.fnmatch_lines(
         ["SKIPPED*the adapter of broken (nosuch:Class, of broken-sims 1.0)*"]
     )
@@ -94,25 +93,24 @@ def test_two_distributions_of_one_name(pytester: pytest.Pytester, site: Path) ->
         "(nosuch:Other); uninstall or rename one of them"
     )
     for arguments in (["--sim=good"], ["--sim-set=good.timestep=0.001"], ["--sim-python=good=sh"]):
-        result = pytester.runpytest_subprocess(*arguments)
-        assert result.ret == pytest.ExitCode.USAGE_ERROR
+        result = run_pytest(pytester, "", *arguments, ret=pytest.ExitCode.USAGE_ERROR)
         assert sorted(result.stderr.str().split()) == sorted(f"ERROR: {sentence}".split())
     result = simbench(pytester, "list", "-v")
     result.stdout.fnmatch_lines(["good: BROKEN: good is registered by *"])
-    pytester.runpytest_subprocess("--sim=mujoco", "--reps=1").assert_outcomes(passed=1)
+    run_pytest(pytester, "--sim=mujoco --reps=1", passed=1)
 
 
 def test_one_of_ours_cannot_be_taken_over(pytester: pytest.Pytester, site: Path) -> None:
     distribution(site, "second-sims", "mujoco = good_adapter:Good")
-    result = pytester.runpytest_subprocess("--sim=mujoco")
+    result = run_pytest(pytester, "--sim=mujoco")
     result.stderr.fnmatch_lines(["*mujoco is registered by second-sims 1.0 *pytest-simbench*"])
-    pytester.runpytest_subprocess("--sim=pybullet", "--reps=1").assert_outcomes(passed=1)
+    run_pytest(pytester, "--sim=pybullet --reps=1", passed=1)
 
 
 def test_the_same_adapter_twice_is_no_clash(pytester: pytest.Pytester, site: Path) -> None:
     distribution(site, "first-sims", "good = good_adapter:Good")
     distribution(site, "second-sims", "good = good_adapter:Good")
-    pytester.runpytest_subprocess("--sim=good", "--reps=1").assert_outcomes(passed=1)
+    run_pytest(pytester, "--sim=good --reps=1", passed=1)
 
 
 def test_odd_metadata(pytester: pytest.Pytester, site: Path) -> None:
@@ -121,7 +119,7 @@ def test_odd_metadata(pytester: pytest.Pytester, site: Path) -> None:
     result = simbench(pytester, "list", "-v")
     assert result.ret == 0
     result.stdout.fnmatch_lines_random(["*BROKEN: *malformed*", "*BROKEN: *nameless*"])
-    pytester.runpytest_subprocess("--sim=mujoco", "--reps=1").assert_outcomes(passed=1)
+    run_pytest(pytester, "--sim=mujoco --reps=1", passed=1)
 
 
 @pytest.mark.parametrize("entries", ["a line that is none", b"\xff\xfe = x:Y"])
@@ -142,11 +140,9 @@ def test_metadata_that_nobody_can_read(
 
 def test_a_profile_that_one_simulator_lacks(pytester: pytest.Pytester, site: Path) -> None:
     distribution(site, "good-sims", "good = good_adapter:OnlyDefault")
-    result = pytester.runpytest_subprocess("--collect-only", "-q")
+    result = run_pytest(pytester, "--collect-only -q")
     assert "mujoco-headless" in result.stdout.str()
     assert "good-headless" not in result.stdout.str()
-    result = pytester.runpytest_subprocess("--sim=good")
+    result = run_pytest(pytester, "--sim=good")
     usage_error(result, "*good has no settings profile 'tuned'; choose from default")
-    pytester.runpytest_subprocess(
-        "--sim=good", "--sim-profile=tuned,default", "--reps=1"
-    ).assert_outcomes(passed=1, skipped=1)
+    run_pytest(pytester, "--sim=good --sim-profile=tuned,default --reps=1", passed=1, skipped=1)

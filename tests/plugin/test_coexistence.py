@@ -10,7 +10,7 @@ import pytest
 from pytest_simbench import __version__
 from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS
-from tests.plugin.inner import no_traceback, records
+from tests.plugin.inner import no_traceback, records, run_pytest
 
 FLAGS = [flag for o in OPTIONS for flag in (o.flag, o.long) if flag]
 FLAGS += [command.flag for command in OLD_OPTIONS]
@@ -50,9 +50,7 @@ def test_any_of_our_names_may_be_somebody_else_s(pytester: pytest.Pytester, plac
     pytester.makepyfile(**{"conftest" if place == "conftest" else "other": own})
     if place == "after":
         pytester.makeconftest("pytest_plugins = ['other']")
-    result = pytester.runpytest_subprocess(*early, *FLAGS)
-    result.assert_outcomes(passed=1)
-    no_traceback(result)
+    run_pytest(pytester, "", *early, *FLAGS, passed=1)
     if place == "conftest":
         no_traceback(pytester.runpytest_subprocess("--help"))
 
@@ -62,11 +60,13 @@ def test_taken_short_names_leave_the_sure_ones(pytester: pytest.Pytester) -> Non
     pytester.makeconftest(OWN.format(flags=short, ini=[name.lstrip("-") for name in short]))
     pytester.makepyfile(FALLING)
     pytester.makeini("[pytest]\nsim_jitter = 0\n")
-    result = pytester.runpytest_subprocess(
-        *short, "--sim-name=mujoco", "--sim-protocol=fast", "--sim-headless", "--sim-robot=panda",
-        "--sim-reps=2", "--sim-output=out",
-    )  # fmt: skip
-    result.assert_outcomes(passed=1)
+    result = run_pytest(
+        pytester,
+        "--sim-name=mujoco --sim-protocol=fast --sim-headless --sim-robot=panda --sim-reps=2",
+        "--sim-output=out",
+        *short,
+        passed=1,
+    )
     for option in (option for option in OPTIONS if option.long):
         result.stdout.fnmatch_lines(
             [f"{option.flag} belongs to another plugin or to a conftest*{option.long} for*"]
@@ -87,7 +87,7 @@ def test_values_of_ours_are_no_folders_with_conftests(pytester: pytest.Pytester)
     pytester.makeini("[pytest]\ntestpaths = tests\n")
     pytester.mkdir("out")
     words = "--reps 4 --sim mujoco --sim-output out --their --collect-only"
-    result = pytester.runpytest_subprocess(*words.split())
+    result = run_pytest(pytester, "", *words.split())
     result.stdout.fnmatch_lines(["*1 test collected*"])
 
 
@@ -95,7 +95,7 @@ def test_a_flag_of_a_conftest_before_a_path(pytester: pytest.Pytester) -> None:
     tests = pytester.mkdir("tests")
     (tests / "conftest.py").write_text(OWN.format(flags=["--sim"], ini=[]))
     (tests / "test_it.py").write_text(TEST.format(flags=["--sim"], ini=[]))
-    pytester.runpytest_subprocess("--sim", "tests").assert_outcomes(passed=1)
+    run_pytest(pytester, "--sim tests", passed=1)
 
 
 @pytest.mark.parametrize("autoload", [True, False])
@@ -110,18 +110,18 @@ def test_loaded_by_name(
     pytester.makeconftest(named + OWN.format(flags=["--gui"], ini=[]))
     pytester.makepyfile(FALLING)
     early = ("-p", "pytest_simbench.plugin") if place == "-p" else ()
-    result = pytester.runpytest_subprocess(
-        *early, "--sim=mujoco", "--reps=2", "--gui", "-Werror::pytest.PytestAssertRewriteWarning"
+    run_pytest(
+        pytester,
+        "--sim=mujoco --reps=2 --gui -Werror::pytest.PytestAssertRewriteWarning",
+        *early,
+        passed=1,
     )
-    result.assert_outcomes(passed=1)
-    no_traceback(result)
 
 
 def test_a_project_s_own_benchmark_fixture(pytester: pytest.Pytester) -> None:
     pytester.makeconftest("import pytest\n@pytest.fixture\ndef benchmark():\n    return 'ours'\n")
     pytester.makepyfile(FALLING)
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "-p", "no:benchmark")
-    result.assert_outcomes(passed=1)
+    run_pytest(pytester, "--sim=mujoco --reps=2 -p no:benchmark", passed=1)
 
 
 WITH_FIXTURES = "import pytest\n" + "".join(
@@ -144,8 +144,7 @@ def test_fixtures_of_our_names(pytester: pytest.Pytester, place: str) -> None:
         """
     )
     early = ("-p", "other") if place == "plugin" else ()
-    result = pytester.runpytest_subprocess(*early, "--strict-markers")
-    result.assert_outcomes(passed=1)
+    run_pytest(pytester, "--strict-markers", *early, passed=1)
     assert not (pytester.path / ".simbench").exists()
 
 
@@ -154,7 +153,7 @@ def test_ours_under_another_name(pytester: pytest.Pytester) -> None:
         WITH_FIXTURES + "from pytest_simbench.plugin.fixtures import repeat as sim_repeat\n"
     )
     pytester.makepyfile(FALLING.replace("repeat", "sim_repeat"))
-    pytester.runpytest_subprocess("--sim=mujoco", "--reps=2").assert_outcomes(passed=1)
+    run_pytest(pytester, "--sim=mujoco --reps=2", passed=1)
 
 
 def test_an_unrelated_run_sees_nothing_of_us(pytester: pytest.Pytester) -> None:
@@ -168,8 +167,7 @@ def test_an_unrelated_run_sees_nothing_of_us(pytester: pytest.Pytester) -> None:
             pass
         """
     )
-    result = pytester.runpytest_subprocess("--gui", "--strict-markers")
-    result.assert_outcomes(passed=1)
+    result = run_pytest(pytester, "--gui --strict-markers", passed=1)
     assert "sim" not in result.stdout.str().replace("simbench", "").partition("collected")[2]
     assert not Path(pytester.path, ".simbench").exists()
 

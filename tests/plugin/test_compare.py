@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from textwrap import dedent
@@ -14,6 +11,7 @@ from xml.etree import ElementTree
 import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
+from tests.plugin.inner import run_before, run_pytest
 
 TEST = """
     import os
@@ -22,7 +20,7 @@ TEST = """
     def test_falling(repeat):
         repeat(Falling(duration=float(os.environ.get("DURATION", "0.6"))))
 """
-ARGUMENTS = ("--sim=mujoco", "--reps=5")
+ARGUMENTS = "--sim=mujoco --reps=5"
 WORSE = "FAILED test_falling[mujoco-headless]: landed fell from 100 % to 0 % (worse by"
 
 
@@ -31,17 +29,9 @@ def saved(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Path]:
     """A folder with a run whose cubes land, saved in every form that a baseline may have."""
-    folder = tmp_path_factory.mktemp("saved")
-    (folder / "test_it.py").write_text(dedent(TEST))
-    command = [
-        *(sys.executable, "-m", "pytest", *ARGUMENTS, "--sim-output=base"),
-        *("--benchmark-json=base.json", "--benchmark-autosave"),
-    ]
-    outer = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST_XDIST")}
-    environment = {**outer, "PYTHONPATH": str(request.config.rootpath)}
-    subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
-    yield folder
-    shutil.rmtree(folder)
+    words = f"{ARGUMENTS} --sim-output=base --benchmark-json=base.json --benchmark-autosave"
+    with run_before(request, tmp_path_factory, TEST, words) as folder:
+        yield folder
 
 
 @pytest.fixture
@@ -67,14 +57,15 @@ def test_a_worse_run_fails_with_one_sentence(
     summary.write_text("before\n")
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(summary))
     monkeypatch.setenv("DURATION", "0.05")  # the cubes are still in the air
-    result = pytester.runpytest_subprocess(
-        *ARGUMENTS, "--sim-output=now", *form, "--sim-compare-fail=landed:5%"
+    result = run_pytest(
+        pytester,
+        f"{ARGUMENTS} --sim-output=now --sim-compare-fail=landed:5%",
+        *form,
+        ret=1,
+        passed=1,
     )
-    assert result.ret == pytest.ExitCode.TESTS_FAILED
-    result.assert_outcomes(passed=1)
     output = result.stdout.str()
     assert output.count(WORSE) == 1
-    assert "Traceback" not in output + result.stderr.str()
     settings = output.index("settings.task.duration was 0.6, is 0.05")
     assert output.index("landed fell") < settings < output.rindex("landed fell")
     written = summary.read_text()
@@ -85,10 +76,11 @@ def test_a_worse_run_fails_with_one_sentence(
 
 
 def test_the_same_again_passes_and_says_so(pytester: pytest.Pytester, baseline: Path) -> None:
-    result = pytester.runpytest_subprocess(
-        *ARGUMENTS, "--sim-baseline=base", "--sim-compare-fail=landed:0%,ram_peak:50%"
+    result = run_pytest(
+        pytester,
+        f"{ARGUMENTS} --sim-baseline=base --sim-compare-fail=landed:0%,ram_peak:50%",
+        ret=0,
     )
-    assert result.ret == pytest.ExitCode.OK
     result.stdout.fnmatch_lines(["no metric got worse beyond its limit"])
 
 
@@ -97,14 +89,12 @@ def test_limits_in_the_ini_file_wait_for_a_baseline_which_alone_fails_nothing(
 ) -> None:
     monkeypatch.setenv("DURATION", "0.05")
     monkeypatch.setenv("COLUMNS", "160")  # no table is cut
-    result = pytester.runpytest_subprocess(*ARGUMENTS, "--sim-baseline=base")
-    assert result.ret == pytest.ExitCode.OK
+    result = run_pytest(pytester, f"{ARGUMENTS} --sim-baseline=base", ret=0)
     result.stdout.fnmatch_lines(["test_falling*landed*100 %*0 %*"])
     assert "got worse" not in result.stdout.str()
     pytester.makeini("[pytest]\nsim_compare_fail = landed:5%\n")
-    assert pytester.runpytest_subprocess(*ARGUMENTS).ret == pytest.ExitCode.OK
-    result = pytester.runpytest_subprocess(*ARGUMENTS, "--sim-baseline=base")
-    assert result.ret == pytest.ExitCode.TESTS_FAILED
+    run_pytest(pytester, ARGUMENTS, ret=0)
+    run_pytest(pytester, f"{ARGUMENTS} --sim-baseline=base", ret=1)
 
 
 def test_a_limit_of_another_package_s_share_that_nothing_can_exceed_fails_the_run(
@@ -112,16 +102,16 @@ def test_a_limit_of_another_package_s_share_that_nothing_can_exceed_fails_the_ru
 ) -> None:
     """A run of before descriptions were kept: that `landed` is a share is known only when its
     task has run. Else it is known before."""
-    result = pytester.runpytest_subprocess(
-        *ARGUMENTS, "--sim-baseline=base", "--sim-compare-fail=landed:5"
+    result = run_pytest(
+        pytester,
+        f"{ARGUMENTS} --sim-baseline=base --sim-compare-fail=landed:5",
+        ret=pytest.ExitCode.USAGE_ERROR,
     )
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(["*landed:5 can never be exceeded: landed lies between 0*"])
     (baseline / "base/tasks.jsonl").unlink()
-    result = pytester.runpytest_subprocess(
-        *ARGUMENTS, "--sim-baseline=base", "--sim-compare-fail=landed:5"
+    result = run_pytest(
+        pytester, f"{ARGUMENTS} --sim-baseline=base --sim-compare-fail=landed:5", ret=1
     )
-    assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(["FAILED landed:5 can never be exceeded: landed lies between 0*"])
 
 
@@ -144,10 +134,9 @@ def test_a_limit_that_compares_nothing_fails_the_run_and_says_why(
     (baseline / "other.py").write_text(dedent(TEST).replace("test_falling", "test_other"))
     (baseline / "plain.py").write_text("def test_nothing():\n    pass\n")
     for more, code in (["--sim-compare-fail=landed:5%"], 1), ([], 0):
-        result = pytester.runpytest_subprocess(
-            "--sim=mujoco", "--reps=1", "--sim-baseline=base", *more, *arguments
+        result = run_pytest(
+            pytester, "--sim=mujoco --reps=1 --sim-baseline=base", *more, *arguments, ret=code
         )
-        assert result.ret == code
         if code:
             result.stdout.fnmatch_lines([told])
             assert "no metric got worse" not in result.stdout.str()
@@ -158,8 +147,7 @@ def test_junit_has_a_property_for_each_metric(
 ) -> None:
     monkeypatch.setenv("DURATION", "200")  # long enough for the resources to be sampled
     pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--junitxml=junit.xml")
-    result.assert_outcomes(passed=1)
+    run_pytest(pytester, "--sim=mujoco --reps=2 --junitxml=junit.xml", passed=1)
     tree = ElementTree.parse(pytester.path / "junit.xml")
     found = {item.get("name"): item.get("value") for item in tree.iter("property")}
     assert found["repetitions"] == "2"

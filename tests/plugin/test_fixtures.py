@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from tests.plugin.inner import run_pytest
+
 
 def test_simulator_is_safe_under_hypothesis(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
@@ -26,8 +28,7 @@ def test_simulator_is_safe_under_hypothesis(pytester: pytest.Pytester) -> None:
             assert len(pids) == 2  # one for each simulator
         """
     )
-    result = pytester.runpytest_subprocess("--sim=mujoco,pybullet", "-p", "no:randomly")
-    result.assert_outcomes(passed=3)
+    run_pytest(pytester, "--sim=mujoco,pybullet -p no:randomly", passed=3)
 
 
 def test_settings_and_resources(pytester: pytest.Pytester) -> None:
@@ -51,4 +52,4 @@ def test_settings_and_resources(pytester: pytest.Pytester) -> None:
             assert output_path.is_dir()
         """
     )
-    pytester.runpytest_subprocess("--sim=mujoco").assert_outcomes(passed=1)
+    run_pytest(pytester, "--sim=mujoco", passed=1)

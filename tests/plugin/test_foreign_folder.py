@@ -10,9 +10,10 @@ import pytest
 
 from pytest_simbench.recordings.film import Film
 from pytest_simbench.records.folder import TASKS, RunFolder
-from pytest_simbench.report.files import write_report
+from pytest_simbench.report.files import write_files
+from pytest_simbench.report.model.report import Report
 from tests.cli.command import simbench
-from tests.plugin.inner import CLAIMING
+from tests.plugin.inner import CLAIMING, run_pytest
 from tests.records.build import record
 
 pytest.importorskip("av", reason="videos need the extra 'video'")
@@ -31,7 +32,7 @@ def test_links_in_a_run_folder_are_not_followed(
     """All that a run leaves lies elsewhere, behind links; it is resumed and reported."""
     monkeypatch.setenv("TMPDIR", str(pytester.mkdir("spare")))
     pytester.makepyfile(CLAIMING)
-    pytester.runpytest_subprocess("--sim=mujoco", "--reps=1", "--sim-output=o", *KEEP)
+    run_pytest(pytester, "--sim=mujoco --reps=1 --sim-output=o", *KEEP)
     run, elsewhere = pytester.path / "o", pytester.mkdir("elsewhere")
     for name in ("repeatability.jsonl", "thresholds.jsonl"):
         (run / name).touch()
@@ -42,8 +43,7 @@ def test_links_in_a_run_folder_are_not_followed(
         (run / name).rename(elsewhere / name)
         (run / name).symlink_to(elsewhere / name)
     before = content(elsewhere)
-    resumed = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--sim-resume=o", *KEEP)
-    resumed.assert_outcomes(passed=1)
+    resumed = run_pytest(pytester, "--sim=mujoco --reps=2 --sim-resume=o", *KEEP, passed=1)
     reported = simbench(pytester, "report", "o", "--record=mcap")
     assert content(elsewhere) == before
     assert len((run / "records.jsonl").read_text().splitlines()) == 2
@@ -65,7 +65,7 @@ def test_a_report_writes_through_no_temporary_name(tmp_path: Path) -> None:
     for name in names:
         for part in (f".{name}.{os.getpid()}.part", f"{name}.{os.getpid()}.part", f".{name}.part"):
             (tmp_path / "run" / part).symlink_to(victim)
-    assert write_report(run).complete
+    assert write_files(run.path, Report.of(run.read())).complete
     assert run.repair()
     film = Film(tmp_path / "run", "x.mp4")
     film.take(0.0, np.zeros((36, 48, 3), np.uint8))

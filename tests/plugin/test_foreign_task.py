@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
 import pytest
 
 from tests.cli.command import simbench
-from tests.plugin.inner import records
+from tests.plugin.inner import records, run_pytest
 
 PACKAGE = '''
     """Pours seven drops: what only this package says of its numbers."""
@@ -61,11 +60,8 @@ OTHER = """
 """
 
 
-def run(pytester: pytest.Pytester, *arguments: str, ret: int = 0) -> pytest.RunResult:
-    result = pytester.runpytest_subprocess("--sim=mujoco", "-p", "no:cacheprovider", *arguments)
-    assert "Traceback" not in result.stdout.str() + result.stderr.str()
-    assert result.ret == ret, result.stdout.str() + result.stderr.str()
-    return result
+def run(pytester: pytest.Pytester, *more: str, ret: int = 0, **outcomes: int) -> pytest.RunResult:
+    return run_pytest(pytester, "--sim=mujoco -p no:cacheprovider", *more, ret=ret, **outcomes)
 
 
 @pytest.fixture
@@ -99,8 +95,8 @@ def told(text: str) -> None:
 def test_where_the_package_is_gone(
     pytester: pytest.Pytester, package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run(pytester, "--reps=6", "--sim-output=a", "--benchmark-json=a.json").assert_outcomes(passed=1)
-    run(pytester, "--reps=3", "--sim-seed=10007", "--sim-output=b", "-n2").assert_outcomes(passed=1)
+    run(pytester, "--reps=6", "--sim-output=a", "--benchmark-json=a.json", passed=1)
+    run(pytester, "--reps=3", "--sim-seed=10007", "--sim-output=b", "-n2", passed=1)
     assert "spilt volume ml" in Path("b/report.md").read_text()  # xdist's controller read it there
     straight = report(Path("a"))
     assert set(straight) == {"report.html", "report.md", "report.csv"}
@@ -146,7 +142,7 @@ def test_where_the_package_is_gone(
 def test_the_gate_and_a_resumed_run_know_it_too(
     pytester: pytest.Pytester, package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    run(pytester, "--reps=6", "--sim-output=a", "--benchmark-json=a.json").assert_outcomes(passed=1)
+    run(pytester, "--reps=6", "--sim-output=a", "--benchmark-json=a.json", passed=1)
     monkeypatch.setenv("MORE", "5")
     result = run(pytester, "--reps=6", "--sim-baseline=a.json", "--sim-compare-fail=spill:1", ret=1)
     result.stdout.fnmatch_lines(
@@ -171,28 +167,9 @@ def test_the_gate_and_a_resumed_run_know_it_too(
     # Nothing is missing: judged and shown again, nothing is run or written twice.
     lines = {name: Path("a", name).read_bytes() for name in ("records.jsonl", "tasks.jsonl")}
     straight = Path("a/report.md").read_bytes()
-    run(pytester, "--reps=6", "--sim-resume=a").assert_outcomes(passed=1)
+    run(pytester, "--reps=6", "--sim-resume=a", passed=1)
     assert {name: Path("a", name).read_bytes() for name in lines} == lines
     assert Path("a/report.md").read_bytes() == straight
-
-
-def test_a_run_of_before_is_shown_with_a_note(pytester: pytest.Pytester, package: Path) -> None:
-    run(pytester, "--reps=5", "--sim-output=a", "--benchmark-json=a.json")
-    Path("a/tasks.jsonl").unlink()
-    saved = json.loads(Path("a.json").read_text())
-    for benchmark in saved["benchmarks"]:
-        assert benchmark["extra_info"]["simbench"].pop("tasks")
-    Path("a.json").write_text(json.dumps(saved))
-    result = simbench(pytester, "report", "a")
-    result.stdout.fnmatch_lines(["*note: pouring: the run does not say what its metrics mean (*"])
-    for baseline in ("a", "a.json"):  # the run that is compared with it knows
-        result = run(
-            pytester, "--reps=5", f"--sim-baseline={baseline}", "--sim-compare-fail=spill:1"
-        )
-        result.stdout.fnmatch_lines(["*spill*3.5 ml*3.5 ml*passed, limit 1 ml*"])
-    package.unlink()
-    simbench(pytester, "merge", "a", "--output=whole")
-    assert "does not say what its metrics mean" in Path("whole/report.md").read_text()
 
 
 GIVEN = """

@@ -17,7 +17,7 @@ from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
 from tests.motion.small_arm import TOML, small_arm
-from tests.plugin.inner import CLAIMING, usage_error, wrapper
+from tests.plugin.inner import CLAIMING, run_pytest, usage_error, wrapper
 
 LIMIT = "--sim-baseline=good --sim-compare-fail"
 
@@ -181,7 +181,7 @@ def test_a_missing_package_is_told(
 
 def test_a_bad_option_ends_the_run(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(CLAIMING)
-    result = pytester.runpytest_subprocess("--sim=mujocco")
+    result = run_pytest(pytester, "--sim=mujocco")
     usage_error(result, "ERROR: unknown simulator 'mujocco'; choose from *, or all")
 
 
@@ -208,7 +208,7 @@ def test_bad_marks_are_told_all_at_once(pytester: pytest.Pytester) -> None:
         for number, (mark, _) in enumerate(BAD_MARKS)
     )
     pytester.makepyfile("\n".join(["import pytest", *tests]))
-    result = pytester.runpytest_subprocess("--sim=mujoco")
+    result = run_pytest(pytester, "--sim=mujoco")
     usage_error(result)
     lines = [*result.stdout.lines, *result.stderr.lines]
     for number, (_, message) in enumerate(BAD_MARKS):
@@ -227,8 +227,7 @@ def test_unreadable_robot_description(pytester: pytest.Pytester) -> None:
             sim(Scene("s", (), replace(panda(), urdf="/nowhere/panda.urdf")))
         """
     )
-    result = pytester.runpytest_subprocess("--sim=mujoco")
-    result.assert_outcomes(failed=1)
+    result = run_pytest(pytester, "--sim=mujoco", failed=1)
     result.stdout.fnmatch_lines(
         ["*cannot read the robot description /nowhere/panda.urdf: No such file or directory*"]
     )

@@ -9,7 +9,7 @@ import pytest
 
 from pytest_simbench.data import tosses
 from tests.data.samples import falling
-from tests.plugin.inner import records
+from tests.plugin.inner import records, run_pytest
 
 TOSSING = """
 from pytest_simbench.tasks import Tossing
@@ -27,8 +27,7 @@ def test_a_set_is_read_from_the_folder_and_each_toss_is_a_repetition(
     folder = pytester.mkdir("here")
     path = folder / "contactnets_cube_tosses_3.npz"
     tosses.write(path, [1, 2, 3], [falling(5), falling(6), falling(7)])
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-data=here")
-    result.assert_outcomes(passed=1)
+    result = run_pytest(pytester, "--sim=mujoco --sim-data=here", passed=1)
     result.stdout.fnmatch_lines(["tossing: 2 repetitions, protocol fast"])
 
 
@@ -38,14 +37,12 @@ def test_what_is_not_there_or_broken_is_one_sentence(pytester: pytest.Pytester) 
     pytester.makepyfile("".join(tests))
     folder = Path(pytester.mkdir("here"))
     (folder / "contactnets_cube_tosses_1.npz").write_bytes(b"x")
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-data=here", "-rsf")
-    result.assert_outcomes(skipped=1, failed=2)
+    result = run_pytest(pytester, "--sim=mujoco --sim-data=here -rsf", skipped=1, failed=2)
     result.stdout.fnmatch_lines_random([
         "*contactnets_cube_tosses_1.npz holds no arrays*",
         "*is not in *: simbench download planar_impacts*",
         "*no data set 'nosuch'; choose from cube_tosses*",
     ])  # fmt: skip
-    assert "Traceback" not in result.stdout.str()
 
 
 SCENE = """
@@ -84,11 +81,12 @@ def test_alone_it_runs_the_suite_and_says_whether_a_difference_is_noise(
     pytester: pytest.Pytester, blocks: Path
 ) -> None:
     (pytester.path / "test_other.py").write_text("def test_not_collected(): assert False\n")
-    found = pytester.runpytest_subprocess(
-        "--sim-scene", str(blocks), "--sim", "mujoco", "--sim-profile", "tuned,file",
-        "--sim-output=run", "-p", "no:cacheprovider",
-    )  # fmt: skip
-    found.assert_outcomes(passed=12)
+    found = run_pytest(
+        pytester,
+        f"--sim-scene {blocks} --sim mujoco --sim-profile tuned,file --sim-output=run",
+        "-pno:cacheprovider",
+        passed=12,
+    )
     out = found.stdout.str()
     assert "As written, blocks ends alike in all 2, within 1 mm." in out
     account = (pytester.path / "run" / "carried.md").read_text()
@@ -111,8 +109,7 @@ def test_a_premise_of_stored_starts_that_are_all_alike(
     rows = [[0.1 * k, 0.0, z, 1.0, 0.0, 0.0, 0.0] for k in range(5) for z in (0.1, 0.255)]
     np.savez(pytester.path / "starts.npz", lower=rows[::2], upper=rows[1::2])
     (pytester.mkdir("run") / "carried.md").mkdir()
-    found = pytester.runpytest_subprocess("--sim", "mujoco", "--sim-output=run")
-    found.assert_outcomes(passed=1)
+    found = run_pytest(pytester, "--sim mujoco --sim-output=run", passed=1)
     assert "carried.md could not be written (Is a directory)" in found.stdout.str()
     assert "5 starts, and 1 different" in found.stdout.str()
     ends = [r["details"]["places"]["upper"] for r in records(pytester.path / "run")]
@@ -134,10 +131,9 @@ def test_starts_are_where_the_file_has_them_though_its_ground_is_elsewhere(
     np.savez(pytester.path / "starts.npz", **stored)
     own = TESTS.replace("test_upper_sits", "test_own").replace("starts.npz", "keyframes")
     pytester.makepyfile(TESTS + own.replace("import pytest", ""))
-    found = pytester.runpytest_subprocess(
-        "--sim", "mujoco", "--sim-profile", "tuned,file", "--sim-output=run", "--reps=2"
+    run_pytest(
+        pytester, "--sim mujoco --sim-profile tuned,file --sim-output=run --reps=2", passed=4
     )
-    found.assert_outcomes(passed=4)
     ends = [r["details"]["places"]["upper"] for r in records(pytester.path / "run")]
     assert sorted(end[0] for end in ends) == pytest.approx(
         [0.3, 0.3, 0.4, 0.4, 0.5, 0.5, 0.5, 0.5], abs=1e-3
@@ -149,8 +145,7 @@ def test_starts_are_where_the_file_has_them_though_its_ground_is_elsewhere(
 @pytest.mark.engine
 def test_keyframes_that_are_not_there_end_the_run(pytester: pytest.Pytester, blocks: Path) -> None:
     pytester.makepyfile(TESTS.replace("starts.npz", "keyframes"))
-    found = pytester.runpytest_subprocess("--sim", "mujoco")
-    assert found.ret == pytest.ExitCode.USAGE_ERROR
+    found = run_pytest(pytester, "--sim mujoco", ret=pytest.ExitCode.USAGE_ERROR)
     assert f"{blocks} has no keyframes; name a file of starts, or none" in found.stdout.str()
 
 
@@ -162,11 +157,12 @@ def test_what_hangs_on_a_joint_settles_too(pytester: pytest.Pytester, blocks: Pa
         f'<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="flap" pos="0 0 1">{flap}'
         "</body></worldbody></mujoco>"
     )
-    found = pytester.runpytest_subprocess(
-        "--sim-scene", str(blocks), "--sim", "mujoco,drake", "--sim-output=run",
-        "-k", "not step and not mm",
-    )  # fmt: skip
-    found.assert_outcomes(passed=2)
+    run_pytest(
+        pytester,
+        f"--sim-scene {blocks} --sim mujoco,drake --sim-output=run",
+        "-k not step and not mm",
+        passed=2,
+    )
     for record in records(pytester.path / "run"):
         assert record["details"]["places"]["flap"][:3] == pytest.approx([0, 0, 0.8], abs=0.02)
         assert record["metrics"]["tilt"] == pytest.approx(90, abs=3)
@@ -211,14 +207,12 @@ def test_a_log_beside_the_test_is_followed_and_a_broken_one_ends_the_run(
     log = pytester.path / "run.csv"
     log.write_text("time,hinge\n0,0\n0.5,0.05\n1,0.05\n")
     pytester.makepyfile(FOLLOWING)
-    found = pytester.runpytest_subprocess("--sim", "mujoco", "--sim-output=run", "--reps=1")
-    found.assert_outcomes(passed=1)
+    found = run_pytest(pytester, "--sim mujoco --sim-output=run --reps=1", passed=1)
     (record,) = records(pytester.path / "run")
     assert record["details"]["joints"]["hinge"] == pytest.approx(0.05, abs=0.01)
     assert 0.0 < record["metrics"]["worst_hinges"] < 2.0
     log.write_text("time,hinge\n0,0\n0.5,nan\n")
-    found = pytester.runpytest_subprocess("--sim", "mujoco")
-    assert found.ret == pytest.ExitCode.USAGE_ERROR
+    found = run_pytest(pytester, "--sim mujoco", ret=pytest.ExitCode.USAGE_ERROR)
     found.stdout.fnmatch_lines(["*the log * has no finite number of 'hinge' in row 1*"])
 
 
@@ -240,12 +234,10 @@ def test_a_urdf_is_a_scene_and_a_broken_one_ends_the_run(pytester: pytest.Pytest
     path = pytester.path / "cabinet.urdf"
     path.write_text(CABINET)
     asked = "--sim-scene", str(path), "--sim", "mujoco", "--sim-output=run"
-    found = pytester.runpytest_subprocess(*asked, "-k", "not step and not mm")
-    found.assert_outcomes(passed=1)
+    found = run_pytest(pytester, "", *asked, "-k not step and not mm", passed=1)
     (record,) = records(pytester.path / "run")
     assert record["metrics"]["farthest"] == pytest.approx(200, abs=5)  # onto its stop
     assert "limit effort, velocity | not carried" in (pytester.path / "run/carried.md").read_text()
     path.write_text(CABINET.replace('value="2"', 'value="-2"'))
-    found = pytester.runpytest_subprocess(*asked)
-    assert found.ret == pytest.ExitCode.USAGE_ERROR
+    found = run_pytest(pytester, "", *asked, ret=pytest.ExitCode.USAGE_ERROR)
     found.stderr.fnmatch_lines(["ERROR: --sim-scene: *cabinet.urdf, line 4: *mass -2 kg*"])

@@ -7,7 +7,7 @@ import pytest
 from pytest_simbench.cli import main
 from pytest_simbench.plugin import old_options
 from tests.cli.command import simbench
-from tests.plugin.inner import FALLING, distribution, importable, usage_error
+from tests.plugin.inner import FALLING, distribution, importable, run_pytest, usage_error
 
 
 def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str) -> list[str]:
@@ -49,7 +49,7 @@ def test_an_old_option_is_a_command(
 
 
 def test_an_old_option_that_cannot_be(pytester: pytest.Pytester) -> None:
-    result = pytester.runpytest_subprocess("--sim-merge", "none")
+    result = run_pytest(pytester, "--sim-merge none")
     usage_error(
         result,
         "--sim-merge will go with the next release; write: simbench merge none",
@@ -75,8 +75,7 @@ def test_an_untested_version_runs_and_is_named(
     entries = "newer = newer:Newer\nunlisted = newer:Unlisted"
     importable(monkeypatch, distribution(pytester.path / "site", "newer", entries, ADAPTERS))
     pytester.makepyfile(test_it=FALLING)
-    result = pytester.runpytest_subprocess("--sim=newer", "--reps=1", "--sim-output=out")
-    assert result.ret == 0
+    result = run_pytest(pytester, "--sim=newer --reps=1 --sim-output=out", ret=0)
     result.stdout.fnmatch_lines(["*UNTESTED VERSION: mujoco * is here, the*"])
     result = simbench(pytester, "list", "-v")
     result.stdout.fnmatch_lines(

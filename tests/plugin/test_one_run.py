@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.plugin.inner import records, usage_error
+from tests.plugin.inner import records, run_pytest, usage_error
 
 TEST = """
     from tests.tiny import Falling
@@ -19,13 +19,13 @@ TEST = """
 """
 
 
-def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
-    return pytester.runpytest_subprocess("--sim=mujoco", "--reps=1", *arguments)
+def run(pytester: pytest.Pytester, *more: str, **outcomes: int) -> pytest.RunResult:
+    return run_pytest(pytester, "--sim=mujoco --reps=1", *more, **outcomes)
 
 
 def test_a_folder_with_a_run_is_refused_before_anything_runs(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
-    run(pytester, "--sim-output=o").assert_outcomes(passed=1)
+    run(pytester, "--sim-output=o", passed=1)
     before = {path: path.read_bytes() for path in Path("o").rglob("*") if path.is_file()}
     for arguments in (["--sim-output=o", "--sim-set=mujoco.timestep=0.004"],
                       ["--sim-output=o/.", "-n2"]):  # fmt: skip
@@ -36,14 +36,12 @@ def test_a_folder_with_a_run_is_refused_before_anything_runs(pytester: pytest.Py
     pytester.makeini("[pytest]\nsim_output = o\n")
     result = run(pytester)
     usage_error(result, "ERROR: *already holds a run; *")
-    result = run(pytester, "-n2")
-    result.assert_outcomes(errors=1)
+    result = run(pytester, "-n2", errors=1)
     result.stdout.fnmatch_lines(["*already holds a run; *"])
     assert "simulator comparison" not in result.stdout.str()
     unrelated = pytester.makepyfile(test_unrelated="def test_it(): pass")
     for more in ([], ["-n1"]):
-        result = run(pytester, str(unrelated), *more)
-        result.assert_outcomes(passed=1)
+        result = run(pytester, str(unrelated), *more, passed=1)
         assert "simulator comparison" not in result.stdout.str()
     assert run(pytester, "--collect-only", "-q").ret == pytest.ExitCode.OK
     assert {path: path.read_bytes() for path in before} == before
@@ -96,8 +94,7 @@ def test_each_setting_class_and_task_is_a_row_with_files_of_its_own(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "200")
     pytester.makepyfile(SETTINGS)
-    result = run(pytester, "--sim-output=o", "--sim-trace=on", *arguments)
-    result.assert_outcomes(passed=4)
+    run(pytester, "--sim-output=o", "--sim-trace=on", *arguments, passed=4)
     found = records(pytester.path / "o")
     assert len(found) == 6
     for folder, ending in (("logs", "log"), ("traces", "npz")):
@@ -110,17 +107,15 @@ def test_each_setting_class_and_task_is_a_row_with_files_of_its_own(
         assert table.count(f"TestA::test\\_falling timestep={step} | 0 of 1") == 1
         for duration in ("0.2", "0.1"):
             assert f"TestB::test\\_falling timestep={step} task.duration={duration} |" in table
-    result = run(pytester, "--sim-resume=o", "--sim-trace=on", *arguments)
-    result.assert_outcomes(passed=4)
+    run(pytester, "--sim-resume=o", "--sim-trace=on", *arguments, passed=4)
     assert records(pytester.path / "o") == found
 
 
 def test_the_gate_and_saved_benchmarks_keep_them_apart(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(SETTINGS)
-    run(pytester, "--sim-output=a", "--benchmark-json=a.json").assert_outcomes(passed=4)
+    run(pytester, "--sim-output=a", "--benchmark-json=a.json", passed=4)
     for baseline in ("a", "a.json"):
-        result = run(pytester, f"--sim-baseline={baseline}", f"--sim-output=o-{baseline}")
-        result.assert_outcomes(passed=4)
+        result = run(pytester, f"--sim-baseline={baseline}", f"--sim-output=o-{baseline}", passed=4)
         text = result.stdout.str()
         assert "different in the baseline" not in text
         assert "is not in the baseline" not in text
@@ -151,14 +146,12 @@ def test_a_second_attempt_replaces_the_first_in_tables_and_both_stay(
     )
     pytester.makepyfile(TEST)
     path = pytester.path / "o"
-    result = run(pytester, "--sim-output=o")
-    result.assert_outcomes(passed=1)
+    result = run(pytester, "--sim-output=o", passed=1)
     result.stdout.fnmatch_lines(["falling: 1 repetition, protocol fast"])
     assert [(r["repetition"], r["attempt"]) for r in records(path)] == [(1, 1), (1, 2)]
     assert len(list((path / "logs").iterdir())) == 2
     found = records(path)
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--sim-resume=o")
-    result.assert_outcomes(passed=1)
+    result = run_pytest(pytester, "--sim=mujoco --reps=2 --sim-resume=o", passed=1)
     result.stdout.fnmatch_lines(["falling: 2 repetitions, protocol fast"])
     assert records(path)[:2] == found
     assert [(r["repetition"], r["attempt"]) for r in records(path)[2:]] == [(2, 1), (2, 2)]
@@ -171,8 +164,7 @@ def test_what_could_not_be_written_is_said_and_not_shown_as_there(
     pytester.makepyfile(TEST)
     folder = pytester.mkdir("o")
     (folder / "report.md").mkdir()
-    result = run(pytester, "--sim-output=o")
-    result.assert_outcomes(passed=1)
+    result = run(pytester, "--sim-output=o", passed=1)
     result.stdout.fnmatch_lines(["*o/report.md could not be written (Is a directory)"])
     assert "report: " not in result.stdout.str()
     assert (folder / "report.html").is_file()
@@ -192,7 +184,6 @@ def test_a_folder_deleted_while_running_loses_no_record(pytester: pytest.Pyteste
             repeat(Falling(duration=0.1))
         """
     )
-    result = run(pytester, "--sim-output=o")
-    result.assert_outcomes(passed=1)
+    result = run(pytester, "--sim-output=o", passed=1)
     result.stdout.fnmatch_lines(["*task.duration=0.1*", "*task.duration=0.2*"])
     assert len(records(pytester.path / "o")) == 1

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.command import simbench
-from tests.plugin.inner import records
+from tests.plugin.inner import records, run_pytest
 
 SUITE = Path(__file__).resolve().parents[2] / "suites" / "test_physics.py"
 
@@ -18,8 +18,7 @@ def test_a_broken_law_is_a_finding_and_no_failure_unless_asked_for(
     """PyBullet's motors are no springs: a rod on one does not sag. Each law is asked once."""
     pytester.makepyfile(test_physics=SUITE.read_text("utf-8"))
     asked = ("--sim=mujoco,pybullet", "-k", "free_fall or sag", "--sim-output=out", "--reps=3")
-    result = pytester.runpytest_subprocess(*asked, "--sim-threshold=ratio=2")
-    result.assert_outcomes(passed=3, failed=1)
+    result = run_pytest(pytester, "--sim-threshold=ratio=2", *asked, passed=3, failed=1)
     result.stdout.fnmatch_lines(
         [
             "*off by * tolerances*",
@@ -52,13 +51,10 @@ def test_a_law_that_is_asked_once_can_be_claimed_and_gated(pytester: pytest.Pyte
         """
     )
     asked = ("--sim=mujoco", "--reps=20", "--sim-strict")
-    pytester.runpytest_subprocess(*asked, "--sim-output=first").assert_outcomes(passed=1)
+    run_pytest(pytester, "--sim-output=first", *asked, passed=1)
     slower = (*asked, "--sim-set=mujoco.timestep=0.004", "--sim-baseline=first")
-    same = pytester.runpytest_subprocess(*slower, "--sim-compare-fail=ratio:100000%")
-    same.assert_outcomes(passed=1)
-    assert same.ret == 0
-    worse = pytester.runpytest_subprocess(*slower, "--sim-compare-fail=error:50%")
-    assert worse.ret == 1
+    run_pytest(pytester, "--sim-compare-fail=ratio:100000%", *slower, passed=1, ret=0)
+    worse = run_pytest(pytester, "--sim-compare-fail=error:50%", *slower, ret=1)
     worse.stdout.fnmatch_lines(["*: error rose from *", "*every repetition is the same)"])
 
 
@@ -91,7 +87,7 @@ def test_a_sweep_of_two_profiles_is_one_run_that_is_resumed_and_reported(
     )
     asked = ["--sim=mujoco", "-k", "free_fall or refused", "--reps=1", "--sim-output=out"]
     asked.append("--sim-profile=default,tuned")
-    pytester.runpytest_subprocess(*asked).assert_outcomes(passed=4)
+    run_pytest(pytester, "", *asked, passed=4)
     out = pytester.path / "out"
     assert set(ids(out)) == {
         "test_law[mujoco-headless-default-free_fall]", "test_law[mujoco-headless-free_fall]",
@@ -99,8 +95,7 @@ def test_a_sweep_of_two_profiles_is_one_run_that_is_resumed_and_reported(
     }  # fmt: skip
 
     asked += ["--sim-resume=out", "--sim-sweep=0.016,0.002,1e-3"]
-    result = pytester.runpytest_subprocess(*asked)
-    result.assert_outcomes(passed=2 * 2 * 3)
+    result = run_pytest(pytester, "", *asked, passed=2 * 2 * 3)
     result.stdout.fnmatch_lines(
         [
             "mujoco (default) *2/2 *",

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 import pytest
 
 import pytest_simbench.motion.planning  # noqa: F401 - pytester would import native modules a second time
-from tests.plugin.inner import records
+from tests.plugin.inner import records, run_pytest
 from tests.plugin.test_input import refusal
 
 MINE = """
@@ -47,24 +47,23 @@ def test_the_command_that_runs_a_failed_one_again_names_its_file(
 ) -> None:
     claiming = TESTS.replace("    repeat(", "    assert not repeat(")
     pytester.makepyfile(mine=MINE, test_it=claiming)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=1", "--policies=mine.py:nothing,mine.py:still"
+    result = run_pytest(
+        pytester, "--sim=mujoco --reps=1 --policies=mine.py:nothing,mine.py:still", failed=2
     )
-    result.assert_outcomes(failed=2)
     again = next(line for line in result.outlines if "again: pytest" in line)
     assert "--sim-policies=mine.py:nothing,mine.py:still" in again
     words = shlex.split(again.partition("again: pytest ")[2])
-    pytester.runpytest_subprocess(*words).assert_outcomes(failed=1)
+    run_pytest(pytester, "", *words, failed=1)
 
 
 def test_a_test_is_made_for_each_policy_of_its_task(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(mine=MINE, test_it=TESTS)
     pytester.makepyfile(one="def policy(seen):\n    return None\n")
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=2", "--sim-jobs=2", "--sim-output=out",
-        "--policies=mine.py,one.py",
-    )  # fmt: skip
-    result.assert_outcomes(passed=3)
+    run_pytest(
+        pytester,
+        "--sim=mujoco --reps=2 --sim-jobs=2 --sim-output=out --policies=mine.py,one.py",
+        passed=3,
+    )
     found = records("out")
     name = "test_it.py::test_reaching[mujoco-headless-{}]"
     assert [r["test"] for r in found[::2]] == [name.format(n) for n in ("still", "nothing", "one")]
@@ -80,7 +79,7 @@ def test_without_policies_the_shipped_ones_wait_for_their_file(pytester: pytest.
         ((), "test_it.py::test_reaching[[]mujoco-headless-none[]]"),
         (("test_it.py",), "test_it.py::test_reaching[[]mujoco-headless-scripted[]]"),
     ):
-        result = pytester.runpytest_subprocess("--sim=mujoco", "--collect-only", "-q", *arguments)
+        result = run_pytest(pytester, "--sim=mujoco --collect-only -q", *arguments)
         result.stdout.fnmatch_lines([shown, "1 test collected*"])
 
 

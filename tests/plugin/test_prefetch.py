@@ -9,7 +9,7 @@ from textwrap import dedent
 
 import pytest
 
-from tests.plugin.inner import records
+from tests.plugin.inner import records, run_pytest
 
 TEST = """
     import os
@@ -52,9 +52,8 @@ def folder(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> Path:
     return pytester.path
 
 
-def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
-    given = ("--sim=mujoco", SIMS, "--sim-output=out", *arguments)
-    return pytester.runpytest_subprocess(*given)
+def run(pytester: pytest.Pytester, *more: str, **outcomes: int) -> pytest.RunResult:
+    return run_pytest(pytester, "--sim=mujoco --sim-output=out", SIMS, *more, **outcomes)
 
 
 def kept(folder: Path) -> list[tuple[str, str]]:
@@ -65,7 +64,7 @@ def test_two_tests_run_at_once_and_each_record_is_there_once(
     pytester: pytest.Pytester, folder: Path
 ) -> None:
     """The first one waits until another one has begun."""
-    run(pytester, "--sim-jobs=2").assert_outcomes(passed=4)
+    run(pytester, "--sim-jobs=2", passed=4)
     assert len({test for test, _ in kept(folder)}) == len(kept(folder)) == 4
 
 
@@ -73,15 +72,14 @@ def test_one_job_runs_one_after_the_other(
     pytester: pytest.Pytester, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ALONE", "yes")
-    run(pytester).assert_outcomes(passed=4)
+    run(pytester, passed=4)
     spans = [tuple(map(float, line.split())) for line in (folder / "spans").open()]
     assert all(one[1] <= other[0] for one, other in pairwise(sorted(spans)))
 
 
 def test_a_mark_that_names_no_task_is_an_error(pytester: pytest.Pytester, folder: Path) -> None:
     (folder / "test_it.py").write_text(dedent(TEST).replace('repeats("task")', 'repeats("law")'))
-    result = run(pytester, "--sim-jobs=2")
-    result.assert_outcomes(failed=4)
+    result = run(pytester, "--sim-jobs=2", failed=4)
     result.stdout.fnmatch_lines(["*repeats needs the name of a parameter*choose from task*"])
 
 

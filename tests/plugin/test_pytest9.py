@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.plugin import options
-from tests.plugin.inner import usage_error
+from tests.plugin.inner import run_pytest, usage_error
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "pytest9.md"
 
@@ -41,8 +41,7 @@ def test_the_settings_of_the_page_with_strict(pytester: pytest.Pytester) -> None
         "from tests.tiny import Falling\n\ndef test_falling(repeat): repeat(Falling(0.1))"
     )
     Path("pytest.toml").write_text(settings(sim_reps='"2"'))
-    result = pytester.runpytest_subprocess()
-    result.assert_outcomes(passed=2)
+    result = run_pytest(pytester, passed=2)
     result.stdout.fnmatch_lines(["configfile: pytest.toml", "mujoco * of 2 *", "pybullet * of 2 *"])
 
 
@@ -58,13 +57,12 @@ def test_another_type_is_one_sentence(pytester: pytest.Pytester, name: str, valu
 def test_strict_knows_the_marks_the_options_and_the_ids(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
     Path("pytest.toml").write_text(settings())
-    result = pytester.runpytest_subprocess("--collect-only", "-q")
-    assert result.ret == pytest.ExitCode.OK
+    result = run_pytest(pytester, "--collect-only -q", ret=0)
     result.stdout.fnmatch_lines(
         ["*test_name[[]mujoco-headless]", "*test_number[[]*-2]", "*test_name[[]pybullet-headless]"]
     )
     Path("pytest.toml").write_text(settings().replace("sim_reps", "sim_repz"))
-    result = pytester.runpytest_subprocess("--collect-only", "-q")
+    result = run_pytest(pytester, "--collect-only -q")
     usage_error(result, "*Unknown config option: sim_repz*")
 
 
@@ -73,10 +71,8 @@ def test_last_failed_runs_a_test_on_the_simulators_on_which_it_failed(
 ) -> None:
     pytester.makepyfile(TEST)
     sims = "--sim=mujoco,pybullet"
-    pytester.runpytest_subprocess(sims).assert_outcomes(passed=3, failed=1)
-    again = pytester.runpytest_subprocess(sims, "--lf")
-    again.assert_outcomes(failed=1)
+    run_pytest(pytester, "", sims, passed=3, failed=1)
+    again = run_pytest(pytester, "--lf", sims, failed=1)
     again.stdout.fnmatch_lines(["FAILED *test_name[[]pybullet-headless]*"])
-    other = pytester.runpytest_subprocess("--sim=mujoco", "--lf")
-    other.assert_outcomes(passed=3)
+    other = run_pytest(pytester, "--sim=mujoco --lf", passed=3)
     other.stdout.fnmatch_lines(["*1 known failures not in selected tests*"])

@@ -12,6 +12,7 @@ from rosbags.highlevel import AnyReader
 from pytest_simbench.cli.runs import recordings
 from pytest_simbench.recordings.trace import Trace
 from tests.cli.command import simbench
+from tests.plugin.inner import run_pytest
 from tests.report.samples import record
 
 TEST = """
@@ -39,10 +40,7 @@ def heights(folder: Path) -> np.ndarray:
 @pytest.mark.parametrize("more", [[], ["-n2"]], ids=["plain", "xdist"])
 def test_each_repetition_gets_a_bag(pytester: pytest.Pytester, more: list[str]) -> None:
     pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--sim-output=o", "--sim-record=mcap", *more
-    )
-    result.assert_outcomes(passed=1)
+    result = run_pytest(pytester, "--sim=mujoco --sim-output=o --sim-record=mcap", *more, passed=1)
     result.stdout.fnmatch_lines(
         [
             "recordings  repetition 2 of 2  ok after *",
@@ -63,7 +61,7 @@ def test_each_repetition_gets_a_bag(pytester: pytest.Pytester, more: list[str]) 
 
 def test_a_kept_run_is_recorded_later(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(TEST)
-    pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=o", "--sim-trace=on")
+    run_pytest(pytester, "--sim=mujoco --sim-output=o --sim-trace=on")
     assert not (pytester.path / "o" / "recordings").exists()
     result = simbench(pytester, "report", "o", "--record=mcap")
     assert result.ret == 0
@@ -86,10 +84,9 @@ def test_a_run_without_traces_says_so(tmp_path: Path) -> None:
 def test_pictures_and_videos_are_taken_beside_what_is_measured(pytester: pytest.Pytester) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
     pytester.makepyfile(TEST + TEST.replace("def test_falling", "def test_again"))
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco,dart", "--sim-output=o", "--sim-pictures", "--sim-video=first"
+    result = run_pytest(
+        pytester, "--sim=mujoco,dart --sim-output=o --sim-pictures --sim-video=first", passed=4
     )
-    result.assert_outcomes(passed=4)
     told = "dart has no renderer of its own: no pictures and no videos"
     assert result.stdout.str().count(told) == 1
     folder = pytester.path / "o"

@@ -8,26 +8,20 @@ import json
 import pytest
 
 from tests.cli.command import simbench
-from tests.plugin.inner import importable, records, usage_error
+from tests.plugin.inner import records, run_pytest, usage_error
 from tests.plugin.planted import plant
 
 
 @pytest.fixture
 def planted(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
-    environments = pytester.path / "environments"
-    index = plant(pytester.path, environments)
-    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(environments))
-    monkeypatch.setenv("PIP_INDEX_URL", index.as_uri())
-    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", (pytester.path / "none").as_uri())
-    importable(monkeypatch, pytester.path / "site")
+    plant(pytester, monkeypatch)
 
 
 @pytest.mark.usefixtures("planted", "drawn")
 def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
-    result = pytester.runpytest_subprocess("--sim-history=planted:4", "--reps=5")
-    result.assert_outcomes(passed=4)
+    result = run_pytest(pytester, "--sim-history=planted:4 --reps=5", passed=4)
     result.stdout.fnmatch_lines(
-        ["planted, falling (headless tuned): 4 releases, 1.2 to 1.5",
+        ["planted, falling (headless tuned), 4 releases, 1.2 to 1.5:",
          "  landed fell with 1.3: 100 % -> 0 %, p = *"]
     )  # fmt: skip
     (folder,) = (pytester.path / ".simbench" / "history").iterdir()
@@ -46,12 +40,13 @@ def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
     )  # fmt: skip
     assert len(records(folder)) == 20
 
-    result = pytester.runpytest_subprocess(
-        "--sim=planted==1.2,planted==1.3", "--sim-baseline=planted==1.2", "--reps=5",
-        "--sim-compare-fail=landed:5%", f"--sim-resume={folder}",
-    )  # fmt: skip
-    assert result.ret == pytest.ExitCode.TESTS_FAILED
-    result.assert_outcomes(passed=2)
+    result = run_pytest(
+        pytester,
+        "--sim=planted==1.2,planted==1.3 --sim-baseline=planted==1.2 --reps=5",
+        *("--sim-compare-fail=landed:5%", f"--sim-resume={folder}"),
+        ret=1,
+        passed=2,
+    )
     result.stdout.fnmatch_lines(
         ["baseline: planted==1.2 in this run",
          '  versions.planted-engine was "1.2", is "1.3"',
@@ -62,8 +57,8 @@ def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
 @pytest.mark.usefixtures("planted")
 def test_a_worker_with_another_release_than_its_name_says(pytester: pytest.Pytester) -> None:
     other = pytester.path / "environments" / "planted==1.4" / "bin" / "python"
-    result = pytester.runpytest_subprocess(
-        "--sim=planted==1.2", f"--sim-spec=planted==1.2=popen//python={other}", "--reps=1"
+    result = run_pytest(
+        pytester, f"--sim=planted==1.2 --sim-spec=planted==1.2=popen//python={other} --reps=1"
     )
     result.stdout.fnmatch_lines(["CRASHED falling, planted==1.2 *: 1 x WorkerStartError in *"])
     (record,) = pytester.path.glob(".simbench/*/records.jsonl")
@@ -88,5 +83,5 @@ def test_a_worker_with_another_release_than_its_name_says(pytester: pytest.Pytes
 def test_wrong_input_is_one_sentence(
     pytester: pytest.Pytester, arguments: list[str], message: str
 ) -> None:
-    result = pytester.runpytest_subprocess(*arguments)
+    result = run_pytest(pytester, "", *arguments)
     usage_error(result, f"ERROR: *{message}")

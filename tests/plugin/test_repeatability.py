@@ -7,7 +7,7 @@ import json
 import pytest
 
 from tests.cli.command import simbench
-from tests.plugin.inner import distribution, importable
+from tests.plugin.inner import distribution, importable, run_pytest
 
 TEST = """
     from pytest_simbench.tasks import Moment
@@ -40,10 +40,9 @@ def tasks_here(
 @pytest.mark.parametrize("workers", [(), ("-n2",)], ids=["one process", "xdist"])
 def test_results_tables_and_files(pytester: pytest.Pytester, workers: tuple[str, ...]) -> None:
     pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco,pybullet", "--protocol=smoke", "--sim-output=out", *workers
+    result = run_pytest(
+        pytester, "--sim=mujoco,pybullet --protocol=smoke --sim-output=out", *workers, passed=4
     )
-    result.assert_outcomes(passed=4)
     out = pytester.path / "out"
     lines = [json.loads(text) for text in (out / "repeatability.jsonl").read_text().splitlines()]
     kinds = sorted((line["simulator"], line["kind"]) for line in lines)
@@ -76,10 +75,9 @@ def test_a_broken_claim_fails_the_test(
     entry = "noisy = noisy_simbench:Noisy"
     importable(monkeypatch, distribution(pytester.path / "site", "noisy-simbench", entry, NOISY))
     pytester.makepyfile(TEST)
-    result = pytester.runpytest_subprocess(
-        "--sim=noisy", "--protocol=smoke", "--sim-output=out", "-k", "again"
+    result = run_pytest(
+        pytester, "--sim=noisy --protocol=smoke --sim-output=out -k again", failed=1
     )
-    result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(
         [
             "*noisy claims to be deterministic, but*",
@@ -110,8 +108,7 @@ def test_a_failing_example_shrinks_and_tells_how_to_replay(pytester: pytest.Pyte
                 world.wait(0.1)
         """
     )
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--sim-output=out")
-    result.assert_outcomes(failed=1)
+    result = run_pytest(pytester, "--sim=mujoco --sim-output=out", failed=1)
     text = result.stdout.str()
     assert "WorkerExited: the worker was killed by SIGSEGV" in text
     assert "height=42" in text

@@ -11,11 +11,11 @@ import pytest
 from pytest_simbench.plugin.benchmark import shown
 from pytest_simbench.records.baseline import KEY
 from tests.cli.command import simbench
-from tests.plugin.inner import FALLING
+from tests.plugin.inner import FALLING, run_pytest
 
 
-def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
-    return pytester.runpytest_subprocess("--sim=mujoco", "--reps=5", "--sim-output=o", *arguments)
+def run(pytester: pytest.Pytester, *more: str, **outcomes: int) -> pytest.RunResult:
+    return run_pytest(pytester, "--sim=mujoco --reps=5 --sim-output=o", *more, **outcomes)
 
 
 @pytest.fixture(autouse=True)
@@ -28,12 +28,11 @@ def test_an_interrupted_report_is_one_sentence(pytester: pytest.Pytester) -> Non
         """
         import signal
         from pytest_simbench.plugin import run
-        run.write_report = lambda *given: signal.raise_signal(signal.SIGINT)
+        run.write_files = lambda *given: signal.raise_signal(signal.SIGINT)
         """
     )
     result = run(pytester)
     assert result.ret == pytest.ExitCode.INTERRUPTED
-    assert "Traceback" not in f"{result.stdout.str()}\n{result.stderr.str()}"
     lines = [*result.stdout.lines, *result.stderr.lines]
     message = "interrupted while the report was made; the records are kept in */o, and simbench "
     assert fnmatch.filter(lines, f"Exit: {message}report */o makes the report")
@@ -43,8 +42,7 @@ def test_an_interrupted_report_is_one_sentence(pytester: pytest.Pytester) -> Non
 @pytest.mark.usefixtures("drawn")
 def test_a_run_ends_with_its_page_and_the_answer(pytester: pytest.Pytester) -> None:
     """The answer first, where the page is last, and no table of pytest-benchmark between."""
-    result = run(pytester, "--sim-badge=site/badge.json")
-    result.assert_outcomes(passed=1)
+    result = run(pytester, "--sim-badge=site/badge.json", passed=1)
     lines = result.stdout.lines
     start = next(k for k, line in enumerate(lines) if "simulator comparison" in line)
     end = next(k for k, line in enumerate(lines) if line.startswith("report: "))
@@ -70,8 +68,7 @@ def test_everything_is_told_with_v_and_a_badge_that_cannot_be_written(
     pytester: pytest.Pytester,
 ) -> None:
     pytester.mkdir("badge.json")
-    result = run(pytester, "-v", "--sim-badge=badge.json")
-    result.assert_outcomes(passed=1)
+    result = run(pytester, "-v", "--sim-badge=badge.json", passed=1)
     result.stdout.fnmatch_lines(["no badge: *badge.json could not be written (*"])
     output = result.stdout.str()
     assert "where the time went" in output
@@ -99,7 +96,7 @@ def test_the_comparison_with_a_baseline_stands_on_the_page_which_is_made_again(
     pytester: pytest.Pytester,
 ) -> None:
     """From the folder alone: the comparison with a baseline that is gone, and the badge."""
-    pytester.runpytest_subprocess("--sim=mujoco", "--reps=5", "--sim-output=base")
+    run_pytest(pytester, "--sim=mujoco --reps=5 --sim-output=base")
     run(pytester, "--sim-baseline=base")
     (pytester.path / "base").rename(pytester.path / "elsewhere")
     kept = (pytester.path / "o" / "report.html").read_bytes()
@@ -116,10 +113,11 @@ def test_the_comparison_with_a_baseline_stands_on_the_page_which_is_made_again(
 def test_the_badge_of_merged_runs_is_that_of_all(pytester: pytest.Pytester) -> None:
     run(pytester)
     pytester.makepyfile(test_it=FALLING.rstrip() + ".assert_at_least('landed', 0.5)\n    assert 0")
-    pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=5", "--sim-output=second", "--sim-seed=3000",
-        "--sim-badge=badge.json",
-    ).assert_outcomes(failed=1)  # fmt: skip
+    run_pytest(
+        pytester,
+        "--sim=mujoco --reps=5 --sim-output=second --sim-seed=3000 --sim-badge=badge.json",
+        failed=1,
+    )
     badge = pytester.path / "badge.json"
     assert json.loads(badge.read_text())["color"] == "red"
     for command in (["merge", "o", "second", "--output=whole"], ["report", "whole"]):
@@ -143,8 +141,7 @@ def test_a_run_of_repeatability_alone_has_its_page(pytester: pytest.Pytester) ->
                                      {}, {}, found))
         """
     )
-    result = pytester.runpytest_subprocess("--sim-output=o")
-    result.assert_outcomes(passed=1)
+    result = run_pytest(pytester, "--sim-output=o", passed=1)
     result.stdout.fnmatch_lines(["*= repeatability =*", "*5 mm in x change it*", "report: o/*"])
     assert "5 mm in x change it" in (pytester.path / "o" / "report.html").read_text("utf-8")
     assert not (pytester.path / "o" / "report.md").exists()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.motion.small_arm import TOML, small_arm
-from tests.plugin.inner import records
+from tests.plugin.inner import records, run_pytest
 
 HOLDING = '''
     """A robot stands still, whichever it is."""
@@ -58,12 +58,8 @@ HOLDING = '''
 '''
 
 
-def run(pytester: pytest.Pytester, *arguments: str, ret: int = 0) -> pytest.RunResult:
-    result = pytester.runpytest_subprocess("--sim=mujoco", "-p", "no:cacheprovider", *arguments)
-    text = result.stdout.str() + result.stderr.str()
-    assert "Traceback" not in text
-    assert result.ret == ret, text
-    return result
+def run(pytester: pytest.Pytester, *more: str, ret: int = 0, **outcomes: int) -> pytest.RunResult:
+    return run_pytest(pytester, "--sim=mujoco -p no:cacheprovider", *more, ret=ret, **outcomes)
 
 
 def test_a_run_with_another_robot(pytester: pytest.Pytester) -> None:
@@ -71,8 +67,8 @@ def test_a_run_with_another_robot(pytester: pytest.Pytester) -> None:
     another robot is said to be one."""
     pytester.makepyfile(HOLDING)
     path = small_arm(pytester.path)
-    run(pytester, "--reps=1", "--sim-output=panda", "--robot=panda").assert_outcomes(passed=1)
-    run(pytester, "--reps=1", "--sim-output=ur5", "--robot=ur5").assert_outcomes(passed=1)
+    run(pytester, "--reps=1", "--sim-output=panda", "--robot=panda", passed=1)
+    run(pytester, "--reps=1", "--sim-output=ur5", "--robot=ur5", passed=1)
     small_run = ("--reps=1", f"--robot={path}")
     result = run(pytester, *small_run, "--sim-output=small", "--sim-baseline=ur5")
     told = " ".join(result.stdout.str().split())
@@ -119,8 +115,9 @@ def test_what_a_robot_or_a_task_cannot_do(pytester: pytest.Pytester) -> None:
         """,
     )
     path = small_arm(pytester.path, TOML.replace("opened = 0.04", "opened = 0.02"))
-    result = run(pytester, "--reps=1", f"--robot={path}", "--sim-output=out", ret=1)
-    result.assert_outcomes(passed=2, failed=5)
+    result = run(
+        pytester, "--reps=1", f"--robot={path}", "--sim-output=out", ret=1, passed=2, failed=5
+    )
     for sentence in (
         "--robot: robot 'small' opens too little",
         "--robot: robot 'small' has no swing for the throw",
@@ -157,8 +154,16 @@ def test_every_robot(pytester: pytest.Pytester) -> None:
                 assert robot.name in request.node.name
         """,
     )
-    result = run(pytester, "--reps=1", "--robot=all", "--sim-output=out", "-rs", "-v")
-    result.assert_outcomes(passed=5 + 1 + 5, skipped=5 + 4)
+    result = run(
+        pytester,
+        "--reps=1",
+        "--robot=all",
+        "--sim-output=out",
+        "-rs",
+        "-v",
+        passed=5 + 1 + 5,
+        skipped=5 + 4,
+    )
     names = ["panda", "so101", "ur10", "ur5", "xarm7"]
     found = [record["test"] for record in records("out") if record["task"] == "holding"]
     assert found == [

@@ -13,15 +13,14 @@ import numpy as np
 import psutil
 import pytest
 
-from tests.plugin.inner import CLAIMING, FALLING, records
+from tests.plugin.inner import CLAIMING, FALLING, records, run_pytest
 
 
 def test_ids_table_records_logs_and_traces(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(CLAIMING)
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco,pybullet", "--reps=2", "--sim-output=out", "--sim-trace=on", "-v"
+    result = run_pytest(
+        pytester, "--sim=mujoco,pybullet --reps=2 --sim-output=out --sim-trace=on -v", passed=2
     )
-    result.assert_outcomes(passed=2)
     result.stdout.fnmatch_lines(
         [
             "*::test_falling[[]mujoco-headless[]]*",
@@ -75,17 +74,14 @@ def test_marks(pytester: pytest.Pytester) -> None:
             assert case == 2
         """
     )
-    result = pytester.runpytest_subprocess("--sim=mujoco,pybullet", "-rs")
-    result.assert_outcomes(passed=5, skipped=5, xfailed=1)
+    result = run_pytest(pytester, "--sim=mujoco,pybullet -rs", passed=5, skipped=5, xfailed=1)
     result.stdout.fnmatch_lines(["*pybullet has no gpu*"])
 
 
 def test_benchmark_rounds_are_worker_seconds_and_compare(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(CLAIMING)
     arguments = ["--sim=mujoco", "--reps=3", "--benchmark-autosave"]
-    pytester.runpytest_subprocess(
-        *arguments, "--benchmark-json=b.json", "--sim-output=out"
-    ).assert_outcomes(passed=1)
+    run_pytest(pytester, "--benchmark-json=b.json --sim-output=out", *arguments, passed=1)
     (benchmark,) = json.loads((pytester.path / "b.json").read_text())["benchmarks"]
     kept = records(pytester.path / "out")
     seconds = [r["stepping"]["wall"] for r in kept]
@@ -94,8 +90,7 @@ def test_benchmark_rounds_are_worker_seconds_and_compare(pytester: pytest.Pytest
     assert benchmark["stats"]["max"] == pytest.approx(max(seconds))
     assert benchmark["extra_info"]["metrics"] == {"landed": [1.0, 1.0, 1.0]}
     assert benchmark["extra_info"]["settings"]["timestep"] == 0.001
-    result = pytester.runpytest_subprocess(*arguments, "--benchmark-compare")
-    result.assert_outcomes(passed=1)
+    result = run_pytest(pytester, "--benchmark-compare", *arguments, passed=1)
     output = result.stdout.str()
     assert "test_falling[mujoco-headless] (NOW)" in output
     assert "test_falling[mujoco-headless] (0001_" in output
@@ -122,8 +117,7 @@ def test_full_disk_loses_nothing(
     pytester.makepyfile(CLAIMING)
     pytester.makeconftest(FULL_DISK)
     monkeypatch.setenv("TMPDIR", str(pytester.mkdir("spare")))
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--reps=2", "--sim-output=out")
-    result.assert_outcomes(passed=1)
+    result = run_pytest(pytester, "--sim=mujoco --reps=2 --sim-output=out", passed=1)
     result.stdout.fnmatch_lines(["*No space left on device*"])
     (saved,) = (pytester.path / "spare").rglob("*.jsonl")
     assert len(saved.read_text().splitlines()) == 2
@@ -208,7 +202,7 @@ def test_plugin_load_is_light(pytester: pytest.Pytester) -> None:
     )
     others = ("xdist", "xdist.looponfail", "benchmark", "hypothesispytest")
     plugins = [part for name in others for part in ("-p", f"no:{name}")]
-    pytester.runpytest_subprocess(*plugins).assert_outcomes(passed=1)
+    run_pytest(pytester, "", *plugins, passed=1)
 
 
 def test_gui_without_any_display_is_a_skip(
@@ -218,8 +212,7 @@ def test_gui_without_any_display_is_a_skip(
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("PATH", str(pytester.mkdir("empty")))
-    result = pytester.runpytest_subprocess("--sim=mujoco", "--gui", "--reps=1", "-rs")
-    result.assert_outcomes(skipped=1)
+    result = run_pytest(pytester, "--sim=mujoco --gui --reps=1 -rs", skipped=1)
     result.stdout.fnmatch_lines(["*no display, and no Xvfb*"])
 
 
@@ -238,10 +231,12 @@ TOLD = {
 
 def test_declared_deviations_are_recorded_and_shown(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(test_it=FALLING)
-    result = pytester.runpytest_subprocess(
-        f"--sim={','.join(TOLD)}", "--reps=1", "-v", f"--sim-output={pytester.path / 'out'}"
+    result = run_pytest(
+        pytester,
+        f"--sim={','.join(TOLD)} --reps=1 -v",
+        f"--sim-output={pytester.path / 'out'}",
+        ret=0,
     )
-    assert result.ret == 0
     recorded = {r["simulator"]: r["deviations"] for r in records(pytester.path / "out")}
     page = " ".join(result.stdout.str().split())
     for name, texts in TOLD.items():

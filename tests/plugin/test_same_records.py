@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import shutil
-import subprocess
-import sys
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
@@ -15,6 +10,7 @@ from textwrap import dedent
 import pytest
 
 from tests.cli.command import simbench
+from tests.plugin.inner import run_before, run_pytest
 
 TEST = """
     import os
@@ -62,20 +58,14 @@ def kept(folder: Path, *, jobs: bool = False) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def straight(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[list[str]]:
+def straight(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     """The records of one straight run."""
-    folder = tmp_path_factory.mktemp("straight")
-    (folder / "test_it.py").write_text(dedent(TEST))
-    command = [sys.executable, "-m", "pytest", "--sim=mujoco", "--reps=4", "--sim-output=out"]
-    environment = {**os.environ, "PYTHONPATH": str(request.config.rootpath)}
-    subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
-    found = kept(folder / "out")
+    words = "--sim=mujoco --reps=4 --sim-output=out"
+    with run_before(request, tmp_path_factory, TEST, words) as folder:
+        found = kept(folder / "out")
     assert len(found) == 8
     assert all('"bodies": [[' in line for line in found)
-    yield found
-    shutil.rmtree(folder)
+    return found
 
 
 @pytest.fixture
@@ -84,16 +74,15 @@ def folder(pytester: pytest.Pytester) -> Path:
     return pytester.path
 
 
-def run(pytester: pytest.Pytester, *arguments: str) -> pytest.RunResult:
-    return pytester.runpytest_subprocess("--sim=mujoco", *arguments)
+def run(pytester: pytest.Pytester, *more: str, **outcomes: int) -> pytest.RunResult:
+    return run_pytest(pytester, "--sim=mujoco", *more, **outcomes)
 
 
 @pytest.mark.parametrize("arguments", [["-n2"], ["--sim-jobs=2"]], ids=["xdist", "jobs"])
 def test_side_by_side(
     pytester: pytest.Pytester, folder: Path, straight: list[str], arguments: list[str]
 ) -> None:
-    result = run(pytester, "--reps=4", "--sim-output=out", *arguments)
-    result.assert_outcomes(passed=2)
+    result = run(pytester, "--reps=4", "--sim-output=out", *arguments, passed=2)
     assert result.stdout.str().count("simulator comparison") == 1
     assert kept(folder / "out", jobs="--sim-jobs=2" in arguments) == straight
 
@@ -106,7 +95,7 @@ def test_tests_share_the_jobs_of_the_run(
 ) -> None:
     """Two tests at once, and one repetition: its times are as if it had the machine to itself."""
     monkeypatch.setenv("SPANS", str(pytester.path / "spans"))
-    run(pytester, "--reps=4", "--sim-output=out", "-n2", "--sim-jobs=1").assert_outcomes(passed=2)
+    run(pytester, "--reps=4", "--sim-output=out", "-n2", "--sim-jobs=1", passed=2)
     assert kept(folder / "out") == straight
     spans = [line.split() for line in (pytester.path / "spans").read_text().splitlines()]
     in_order = sorted((float(began), float(ended)) for began, ended in spans)
@@ -128,8 +117,7 @@ def test_interrupted_and_resumed(
     assert kept(folder / "out") == straight[:2]
     assert stopped.stdout.str().count("1 cut short") == 2  # the claims, the answer
     monkeypatch.delenv("STOP_AT")
-    result = run(pytester, "--reps=4", "--sim-resume=out", *arguments)
-    result.assert_outcomes(passed=2)
+    result = run(pytester, "--reps=4", "--sim-resume=out", *arguments, passed=2)
     assert kept(folder / "out") == straight
     assert " cut" not in result.stdout.str()
     assert "0 of 4" in result.stdout.str()
@@ -139,8 +127,8 @@ def test_interrupted_and_resumed(
 def test_sharded_and_merged_then_judged_without_running(
     pytester: pytest.Pytester, folder: Path, straight: list[str]
 ) -> None:
-    run(pytester, "--reps=3", "--sim-output=a").assert_outcomes(passed=2)
-    run(pytester, "--reps=1", "--sim-seed=10004", "--sim-output=b").assert_outcomes(passed=2)
+    run(pytester, "--reps=3", "--sim-output=a", passed=2)
+    run(pytester, "--reps=1", "--sim-seed=10004", "--sim-output=b", passed=2)
     merged = simbench(pytester, "merge", "b", "a", "--output=whole")
     assert merged.ret == pytest.ExitCode.OK
     merged.stdout.fnmatch_lines(["falling: 4 repetitions*"])
@@ -148,18 +136,17 @@ def test_sharded_and_merged_then_judged_without_running(
     names = [json.loads(line)["notes"]["log"] for line in straight]
     assert [name[:9] for name in names] == ["logs/test"] * 8
     assert {path.name for path in (folder / "whole/logs").iterdir()} == {n[5:] for n in names}
-    run(pytester, "--reps=4", "--sim-resume=whole").assert_outcomes(passed=2)
+    run(pytester, "--reps=4", "--sim-resume=whole", passed=2)
     assert kept(folder / "whole") == straight
 
 
 def test_another_version_is_not_resumed(pytester: pytest.Pytester, folder: Path) -> None:
     """Another test of the same simulator may have other settings, but not another version; nor may
     a test of which nothing is missing."""
-    run(pytester, "--reps=1", "--sim-output=out", "-k", "one").assert_outcomes(passed=1)
+    run(pytester, "--reps=1", "--sim-output=out", "-k", "one", passed=1)
     path = folder / "out" / "records.jsonl"
     path.write_text(path.read_text().replace('"mujoco": "', '"mujoco": "0.'))
-    result = run(pytester, "--reps=1", "--sim-resume=out")
-    result.assert_outcomes(failed=2)
+    result = run(pytester, "--reps=1", "--sim-resume=out", failed=2)
     result.stdout.fnmatch_lines(['test_one*would not be comparable: versions.mujoco was "0.*'])
     result.stdout.fnmatch_lines(['test_two*would not be comparable: versions.mujoco was "0.*'])
     assert len(path.read_text().splitlines()) == 1

@@ -10,6 +10,7 @@ import pytest
 
 from tests.cli.command import simbench
 from tests.hostile import assert_harmless_terminal
+from tests.plugin.inner import run_pytest
 
 EVIL = "\x1b]0;owned\x07\x1b[2Jred\r\u202e\x9b31m"
 
@@ -50,9 +51,8 @@ def plain(result: pytest.RunResult) -> str:
 @pytest.mark.parametrize("style", ["long", "native"])
 def test_failures_and_skips(pytester: pytest.Pytester, style: str) -> None:
     pytester.makepyfile(TEST.format(evil=EVIL))
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=1", f"--tb={style}", "-l", "-rA", "--color=no"
-    )
+    words = f"--sim=mujoco --reps=1 --tb={style} -l -rA --color=no"
+    result = pytester.runpytest_subprocess(*words.split())  # which shows tracebacks
     result.assert_outcomes(failed=2, passed=1, skipped=1)
     text = plain(result)
     assert r"no \x1b]0;owned\x07\x1b[2Jred \u202e\x9b31m" in text
@@ -84,9 +84,7 @@ def test_merging_and_comparing(pytester: pytest.Pytester) -> None:
     assert result.ret == 0
     assert r"\x1b]0;owned" in text
     pytester.makepyfile(TEST.format(evil=EVIL))
-    result = pytester.runpytest_subprocess(
-        "--sim=mujoco", "--reps=1", "-k", "failing", "--sim-baseline=a", "--color=no"
-    )
+    result = run_pytest(pytester, "--sim=mujoco --reps=1 -k failing --sim-baseline=a --color=no")
     plain(result)
     result.stdout.fnmatch_lines(["*comparison with the baseline*"])
 
@@ -96,7 +94,8 @@ def test_a_usage_error(pytester: pytest.Pytester) -> None:
     record = {**json.loads(RECORDS.read_text().splitlines()[0]), **line}
     folder = pytester.mkdir("\x1b[2Jrun")
     (folder / "records.jsonl").write_text(json.dumps(record) + "\n")
-    result = pytester.runpytest_subprocess("--sim-baseline", folder.name, "--color=no")
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result = run_pytest(
+        pytester, "--color=no", "--sim-baseline", folder.name, ret=pytest.ExitCode.USAGE_ERROR
+    )
     assert re.search(r"ERROR: .*\\x1b\[2Jrun", plain(result))
     assert re.search(r"merge: .*\\x1b\[2Jrun", plain(simbench(pytester, "merge", folder.name)))

@@ -6,6 +6,8 @@ import shutil
 
 import pytest
 
+from tests.plugin.inner import run_pytest
+
 pytest.importorskip("sapien")
 
 
@@ -29,8 +31,7 @@ def test_without_a_vulkan_device_a_window_is_a_skip_and_no_failed_repetition(
         """
     )
     arguments = ("--sim=sapien", "--reps=2", "--sim-output=out", "-rs")
-    result = pytester.runpytest_subprocess(*arguments, "--gui")
-    result.assert_outcomes(skipped=2)
+    result = run_pytest(pytester, "--gui", *arguments, skipped=2)
     result.stdout.fnmatch_lines(["*SAPIEN draws with Vulkan*mesa-vulkan-drivers*"])
     assert not (pytester.path / "out" / "records.jsonl").exists()
-    pytester.runpytest_subprocess(*arguments).assert_outcomes(passed=2)
+    run_pytest(pytester, "", *arguments, passed=2)

@@ -10,7 +10,7 @@ import pytest
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.plugin.selection import select
 from pytest_simbench.simulator.registry import adapter
-from tests.plugin.inner import records, wrapper
+from tests.plugin.inner import records, run_pytest, wrapper
 
 
 @pytest.fixture
@@ -45,11 +45,13 @@ def test_versions_side_by_side(pytester: pytest.Pytester, release: str) -> None:
             pass
         """
     )
-    result = pytester.runpytest_subprocess(
-        f"--sim=mujoco,{release},mujoco@mine=mine/python", "--reps=2", "--sim-output=out",
-        "--sim-set=mujoco.timestep=0.001", f"--sim-set={release}.timestep=0.004",
-    )  # fmt: skip
-    result.assert_outcomes(passed=6, skipped=1)
+    result = run_pytest(
+        pytester,
+        f"--sim=mujoco,{release},mujoco@mine=mine/python --reps=2 --sim-output=out",
+        *("--sim-set=mujoco.timestep=0.001", f"--sim-set={release}.timestep=0.004"),
+        passed=6,
+        skipped=1,
+    )
     for name in ("mujoco", release, "mujoco@mine"):
         result.stdout.fnmatch_lines([f"{name} *"])  # of a table
     kept = records(pytester.path / "out")

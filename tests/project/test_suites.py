@@ -10,8 +10,8 @@ import pytest
 from pytest_simbench.data import Impacts, Tosses
 from pytest_simbench.data.pushes import ArmRuns
 from pytest_simbench.measure.intervals import interval
-from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.measure.verdicts import Verdict, at_least, at_most, confidence, judge
+from pytest_simbench.records.metrics import CRASHED
 from pytest_simbench.tasks import (
     ArmFollowing,
     ArmPushing,

@@ -20,7 +20,7 @@ from pytest_simbench.repeatability.perturbation import (
     perturbed,
 )
 from pytest_simbench.scene import Scene
-from pytest_simbench.tasks import Jitter, LeaningTowers, Throwing
+from pytest_simbench.tasks import Jitter, LeaningTowers, Nesting, Throwing
 
 TOWER = LeaningTowers().scene(1, Jitter())
 THROW = Throwing().scene(1, Jitter())
@@ -59,6 +59,8 @@ def test_mass_and_friction() -> None:
     surfaces = [body.friction for body in smoother.bodies]
     surfaces += [smoother.ground_friction, smoother.robot.friction]
     assert surfaces == pytest.approx([0.8] * len(surfaces))
+    bowls = Perturbation("friction", 20).applied(Nesting(2).scene(1, Jitter()))
+    assert [*bowls.frictions] == pytest.approx([0.24])
 
 
 def test_squeeze_is_the_fingers_alone() -> None:

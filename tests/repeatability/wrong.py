@@ -4,22 +4,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-import numpy as np
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.scene import FloatArray, Scene
-
-
-class Noisy(MuJoCo):
-    """Adds noise that nobody seeded, a micrometre per second at most, to free bodies."""
-
-    def load(self, scene: Scene) -> None:
-        super().load(scene)
-        self._noise = np.random.default_rng()
-
-    def step(self) -> None:
-        self.data.qvel[self._body_v] += self._noise.uniform(-1e-6, 1e-6, self._body_v.shape)
-        super().step()
+from tests.testing.wrong import Noisy as Noisy
 
 
 class Haunted(MuJoCo):

@@ -25,10 +25,10 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
 from pytest_simbench.report.files import (
+    Written,
     csv_of,
     write_badge,
     write_files,
-    write_report,
     write_tables,
 )
 from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
@@ -52,8 +52,12 @@ def folder_of(path: Path, *records: Record, described: bool = True) -> RunFolder
     return RunFolder(path)
 
 
+def written_in(folder: RunFolder) -> Written:
+    return write_files(folder.path, Report.of(folder.read()))
+
+
 def test_a_folder_is_all_that_it_takes(tmp_path: Path) -> None:
-    written = write_report(folder_of(tmp_path, *stacking_run(), *throwing_run()))
+    written = written_in(folder_of(tmp_path, *stacking_run(), *throwing_run()))
     assert written.complete
     report = (tmp_path / "report.md").read_text()
     assert "| release speed m/s |" in report
@@ -62,7 +66,7 @@ def test_a_folder_is_all_that_it_takes(tmp_path: Path) -> None:
     assert [summary.task for summary in written.summaries] == ["stacking", "throwing"]
     before = {path: path.read_bytes() for path in tmp_path.glob("report.*")}
     assert len(before) == 3
-    write_report(RunFolder(tmp_path))
+    written_in(RunFolder(tmp_path))
     assert {path: path.read_bytes() for path in before} == before
 
 
@@ -78,7 +82,7 @@ def test_reading_loads_no_planner(tmp_path: Path) -> None:
 
 
 def test_without_descriptions_numbers_are_plain_and_a_note_says_why(tmp_path: Path) -> None:
-    (summary,) = write_report(folder_of(tmp_path, *stacking_run(), described=False)).summaries
+    (summary,) = written_in(folder_of(tmp_path, *stacking_run(), described=False)).summaries
     assert {metric.better for metric in summary.metrics} == {None}
     for text in (terminal.render_task(summary, 200), (tmp_path / "report.md").read_text()):
         assert "note: stacking: the run does not say what its metrics mean" in text

@@ -53,8 +53,8 @@ from pytest_simbench.report.model.outcome import RunOutcome
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.terminal.parts import (
     claim_lines,
-    history_lines,
     render_changes,
+    render_histories,
     render_tables,
     sweep_lines,
 )
@@ -154,7 +154,7 @@ def report(run: Path) -> None:
     claim_lines(told_of.claims, 40)
     render_brief(told_of.summaries, 40)
     render_run(told_of.summaries, 100)
-    history_lines(told_of.histories, 40)
+    render_histories(told_of.histories, 40)
     sweep_lines(told_of.sweeps, 40, True)
     if outcome.compared is not None:
         render_changes(outcome.compared[1], 100, False)

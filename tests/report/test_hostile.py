@@ -13,9 +13,8 @@ from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.records.repeatability import Line
 from pytest_simbench.report.files import csv_of, write_files
-from pytest_simbench.report.markdown.capabilities import capability_markdown
 from pytest_simbench.report.markdown.run import render_run as markdown
-from pytest_simbench.report.markdown.run import render_section
+from pytest_simbench.report.markdown.run import render_section, table
 from pytest_simbench.report.markdown.run import render_tables as tables_in_markdown
 from pytest_simbench.report.model import changes, repeatability
 from pytest_simbench.report.model.capabilities import columns
@@ -143,7 +142,7 @@ def test_the_tables_of_repeatability(text: str) -> None:
 def test_the_table_of_simulators(text: str) -> None:
     info = replace(adapter("mujoco").info, name=text, title=text, licence=text, engine=text)
     assert_harmless_terminal(render(columns([info]), 100))
-    assert_harmless_markdown(capability_markdown([info]))
+    assert_harmless_markdown(table(columns([info])))
 
 
 @texts

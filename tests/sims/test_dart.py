@@ -82,7 +82,7 @@ def held() -> tuple[Scene, Robot]:
     robot = grasping(known_robot("so101"), EDGE, EDGE / 0.05)
     start = robot.column("initial_position")
     start[-1] = grasp_of(robot, EDGE, EDGE / 0.05).touching + 0.01
-    robot = scenes.with_joint(robot, robot.joints[-1].name, initial_position=float(start[-1]))
+    robot = robot.with_joints(robot.joints[-1].name, initial_position=float(start[-1]))
     pose = RobotModel(robot).tool_pose(start)
     return Scene("held", (small_cube(pose),), robot, gravity=(0.0, 0.0, 0.0)), robot
 

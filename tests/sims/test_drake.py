@@ -18,7 +18,7 @@ from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import STANDARD_GRAVITY, Box, Pose, Scene
 from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.tasks import Jitter, Stacking
-from pytest_simbench.testing import joints, scenes
+from pytest_simbench.testing import joints
 
 from .worlds import loaded, stepped
 
@@ -50,7 +50,7 @@ def test_tuned_cube_rests_on_its_four_lower_corners() -> None:
 def test_a_joint_with_friction_keeps_its_rotor_inertia() -> None:
     """Its brake is an actuator too, and of several Drake takes the rotor inertia of the last."""
     robot = mechanism("braked", joints.slider("braked", friction=4.0))
-    scene = Scene("braked", robot=scenes.with_joint(robot, "braked", armature=1.0))
+    scene = Scene("braked", robot=robot.with_joints("braked", armature=1.0))
     simulator = stepped(loaded(Drake, scene), 0.2)
     falls = simulator.joint_state()[1, 0] / simulator.time
     simulator.close()

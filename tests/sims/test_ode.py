@@ -97,9 +97,7 @@ def test_whole_turns_are_counted(worlds: Worlds, tmp_path: Path) -> None:
 def test_a_wide_joint_may_start_beyond_half_a_turn(
     worlds: Worlds, tmp_path: Path, angle: float
 ) -> None:
-    robot = scenes.with_joint(
-        turning_on(scenes.arm(), tmp_path), "panda_joint7", initial_position=angle
-    )
+    robot = turning_on(scenes.arm(), tmp_path).with_joints("panda_joint7", initial_position=angle)
     world = worlds.load(scenes.arm_alone(robot))
     assert float(world.joints[0, 6]) == pytest.approx(angle, abs=1e-6)
     world.wait(0.1)

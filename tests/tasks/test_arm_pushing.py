@@ -49,7 +49,7 @@ def test_what_is_no_urdf_is_told(tmp_path: Path) -> None:
 
 def test_a_tool_is_tracked_to_a_micrometre_and_held_joints_stay() -> None:
     model = RobotModel(panda())
-    start = model.robot.column("initial_position")[: model.arm]
+    start = model.home
     targets = [model.tool_pose(start).translated(x=0.002 * k, z=-0.001 * k) for k in range(20)]
     path = track(model, targets, start)
     for arm, target in zip(path, targets, strict=True):

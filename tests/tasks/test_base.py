@@ -6,13 +6,26 @@ import hashlib
 import json
 from dataclasses import dataclass, field
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pytest_simbench.motion.registry import find
-from pytest_simbench.scene import Pose
-from pytest_simbench.tasks import Jitter, LeaningTowers, Stacking, Task, Throwing
+from pytest_simbench.scene import Pose, SceneError
+from pytest_simbench.tasks import (
+    Carrying,
+    CurvePushing,
+    Inserting,
+    Jitter,
+    LeaningTowers,
+    Nesting,
+    Opening,
+    Pouring,
+    Stacking,
+    Task,
+    Throwing,
+)
 from pytest_simbench.tasks.base import Randomness
 from tests.tiny import Falling
 
@@ -118,6 +131,58 @@ def test_parameters_are_flat_and_name_every_rule() -> None:
 def test_a_task_of_one_version_is_its_own_smoke_and_study() -> None:
     assert Falling(duration=0.3).smoke() == Falling(duration=0.3)
     assert LeaningTowers().study() == LeaningTowers()
+
+
+ROBOTS = ("panda", "ur5", "ur10", "xarm7", "so101")
+
+
+@pytest.mark.parametrize(
+    ("task", "able"),
+    [
+        (Stacking(), ROBOTS), (CurvePushing(), ROBOTS), (Carrying(), ("panda", "xarm7")),
+        (Opening(), ("panda",)), (Inserting(), ("panda",)), (Inserting("round"), ("xarm7",)),
+    ],
+    ids=lambda value: getattr(value, "name", None),
+)  # fmt: skip
+def test_who_can_do_it_is_told_no_problem(task: Task, able: tuple[str, ...]) -> None:
+    assert [task.on(find(name)).problem() for name in able] == [None] * len(able)
+
+
+@pytest.mark.parametrize(
+    ("task", "name", "problem"),
+    [
+        (Carrying(), "so101", "robot 'so101' has no two parallel fingers"),
+        (Carrying(), "ur5",  # it reaches above it, and not down from there
+         "cannot carry the cube: unreachable: tool at (0.450, -0.150, 0.025)"),
+        (Inserting(), "so101", "robot 'so101' cannot insert the square peg: "),
+        (Inserting(depth=0.06), "panda", "fingers hit the hole before that is 60 mm deep"),
+        (Opening(), "so101", "no two parallel fingers"),
+        (Opening(friction=50.0), "panda",
+         "fingers of robot 'panda' press with 25 N each, and a pull of 50 N opens them"),
+        (Opening(way=0.5), "panda", "robot 'panda' cannot open the drawer: unreachable"),
+    ],
+    ids=lambda value: getattr(value, "name", None),
+)  # fmt: skip
+def test_who_cannot_do_it_is_told_beforehand(task: Task, name: str, problem: str) -> None:
+    assert problem in str(task.on(find(name)).problem())
+
+
+@pytest.mark.parametrize(
+    ("task", "parameters", "said"),
+    [
+        (Opening, {"friction": 0}, "friction of opening is 0; it must be a number above 0"),
+        (Nesting, {"bowls": 0}, "number of bowls of nesting is 0; it must be a number from 1"),
+        (Nesting, {"bowls": 2.5}, "is 2.5; it must be a whole number"),
+        (Pouring, {"balls": 0}, "number of balls of pouring is 0"),
+        (Carrying, {"shape": "cone"}, "is 'cone'; choose from cube, ball, tube, pill, prism"),
+        (Inserting, {"section": "hex"}, "is 'hex'; choose from square, round"),
+        (Stacking, {"towers": 4}, "towers of stacking is 4; it must be a number from 1 to 3"),
+        (Stacking, {"levels": 0}, "number of levels of stacking is 0"),
+    ],
+)
+def test_a_parameter_that_cannot_be(task: Any, parameters: dict[str, Any], said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        task(**parameters)
 
 
 TASKS = [Stacking(), Throwing()]

@@ -11,7 +11,8 @@ from pytest_simbench.client.motion import Motion
 from pytest_simbench.scene import Box, Compound, Pose, Scene, Start, Trajectory
 from pytest_simbench.tasks import Fitting, Log
 from pytest_simbench.tasks import fitting as module
-from tests.tasks.scripted_scene import SCENE, Scripted
+from tests.tasks.scripted import perform
+from tests.tasks.scripted_scene import SCENE, Moved
 
 TIME = np.array([0.0, 0.35, 1.0])
 ROWS = np.zeros((2, 2))
@@ -21,7 +22,7 @@ def test_joints_are_held_against_the_log_at_its_own_times() -> None:
     seen = {"time": TIME, "slider": np.array([0.05, 0.1, 0.2])}
     log = Log(Trajectory(1.0, ROWS, ROWS, ROWS), ["slider"], Start((), ()), Start((), ()), "", seen)
     task = Fitting(SCENE, log, {"spring:slider": 3.0})
-    outcome = task.perform(Scripted(SCENE, end=(0.0, 0.05)), 1, lambda done, of: None)  # type: ignore[arg-type]
+    outcome, _ = perform(task, process=Moved(end=(0.0, 0.05)))
     assert outcome.details["residuals"] == {"slider": [[0.0], [-0.05], [-0.15]]}
     assert outcome.metrics == {"off": pytest.approx(1000 * math.sqrt((0.05**2 + 0.15**2) / 3))}
     assert [metric.name for metric in task.metrics] == ["off"]

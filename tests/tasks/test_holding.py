@@ -13,7 +13,8 @@ from pytest_simbench.experiment.scene_file import read_scene_file
 from pytest_simbench.scene import Scene, SceneError, Start
 from pytest_simbench.tasks import Holding, Jitter
 from tests.conftest import case_of, performed
-from tests.tasks.scripted_scene import SCENE, Scripted
+from tests.tasks.scripted import perform
+from tests.tasks.scripted_scene import SCENE, Moved
 
 MASS, LENGTH, STIFFNESS = 0.5, 0.2, 40.0
 ARM = f"""
@@ -64,8 +65,8 @@ def test_drives_are_told_the_keyframe_s_targets() -> None:
 
 def test_joints_are_measured_by_kind_each_in_its_unit() -> None:
     """Hinge by 0.01 rad, slider by 2 mm; both at a steady speed in the last half second."""
-    world = Scripted(SCENE, end=(0.01, 0.048), speed=(0.002, -0.003))
-    outcome = Holding(SCENE).perform(world, 1, lambda done, of: None)  # type: ignore[arg-type]
+    process = Moved(end=(0.01, 0.048), speed=(0.002, -0.003))
+    outcome, _ = perform(Holding(SCENE), process=process)
     assert outcome.metrics == pytest.approx({
         "gone_hinges": np.degrees(0.01), "gone_sliders": 2.0,
         "restless_hinges": np.degrees(0.002), "restless_sliders": 3.0,
@@ -74,7 +75,7 @@ def test_joints_are_measured_by_kind_each_in_its_unit() -> None:
         "gone_hinges": "deg", "gone_sliders": "mm",
         "restless_hinges": "deg/s", "restless_sliders": "mm/s",
     }  # fmt: skip
-    assert world.followed[0].position.tolist() == [[0.0, 0.05]] * 2
+    assert process.asked[0].arguments["position"].tolist() == [[0.0, 0.05]] * 2
 
 
 def test_without_joints_it_says_what_to_do() -> None:

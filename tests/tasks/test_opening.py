@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import FloatArray
 from pytest_simbench.tasks import Jitter, Opening
 from pytest_simbench.tasks.base import Outcome
@@ -78,20 +77,6 @@ def test_each_fault_shows_in_its_own_number() -> None:
     assert heavy["work"] == pytest.approx(1.2, abs=0.01)
     assert heavy["peak"] == pytest.approx(1.2)
     assert opened(drift=0.004).metrics["creep"] == pytest.approx(4.0)
-
-
-def test_who_cannot_open_it_is_told_beforehand() -> None:
-    assert TASK.problem() is None
-    problem = TASK.on(find("so101")).problem()
-    assert problem is not None
-    assert "no two parallel fingers" in problem
-    problem = Opening(friction=50.0).problem()
-    assert problem == (
-        "the fingers of robot 'panda' press with 25 N each, and a pull of 50 N opens them"
-    )
-    problem = Opening(way=0.5).problem()
-    assert problem is not None
-    assert problem.startswith("robot 'panda' cannot open the drawer: unreachable")
 
 
 @pytest.mark.parametrize("name", ["mujoco", "drake"])  # Drake told the forces of the next step

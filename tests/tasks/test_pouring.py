@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -13,6 +10,7 @@ from pytest_simbench.scene import Pose
 from pytest_simbench.tasks import Jitter, Pouring
 from pytest_simbench.tasks.pouring import RADIUS, SPACING, TRAY
 from tests.conftest import performed
+from tests.tasks.scripted import Mishap, perform, put
 
 
 @pytest.mark.parametrize("balls", [1, 6, 10, 30, 100])
@@ -28,34 +26,19 @@ def test_all_begin_in_the_cup_apart_from_each_other(balls: int) -> None:
     assert np.abs(centres[:, :2]).max() + RADIUS < wall
 
 
-class World:
-    """Three looks at the balls: at the start, nearly upright, at the end."""
-
-    def __init__(self, task: Pouring, *looks: dict[str, Pose]) -> None:
-        scene = task.scene(1, Jitter())
-        self.bodies = {body.name: body.pose for body in scene.free_bodies}
-        self.looks = list(looks)
-
-    def wait(self, seconds: float) -> None:
-        self.bodies |= self.looks.pop(0)
-
-    def pose(self, name: str) -> Pose:
-        return self.bodies[name]
-
-    def phase(self, name: str) -> Any:
-        return nullcontext()
-
-    def mark(self, moment: str) -> None:
-        pass
-
-
 def test_what_leaks_and_what_misses_the_tray_is_counted() -> None:
     task = Pouring(4)
     tray = {f"ball_0{k}": Pose.at(0.05 * k, 0.0, RADIUS) for k in (1, 2, 3, 4)}
     under, beside = Pose.at(0.0, 0.0, 0.2), Pose.at(TRAY / 2 + 0.05, 0.0, RADIUS)
-    world = World(task, {"ball_01": under}, tray, {"ball_02": beside, "ball_03": Pose.at(0, 0, -1)})
-    found = task.perform(world, 1, lambda done, of: None)  # type: ignore[arg-type]
-    assert found.metrics == {"in_tray": 0.5, "leaked": 0.25}
+    outcome, process = perform(
+        task,
+        Mishap("lean", 0.1, put("ball_01", under)),
+        *(Mishap("pour", 0.1, put(name, pose)) for name, pose in tray.items()),
+        Mishap("settle", 0.1, put("ball_02", beside)),
+        Mishap("settle", 0.1, put("ball_03", Pose.at(0, 0, 0.2))),
+    )
+    assert outcome.metrics == {"in_tray": 0.5, "leaked": 0.25}
+    assert process.counts == [(2, 4)]
 
 
 def test_on_an_engine(case: Case) -> None:

@@ -16,7 +16,8 @@ from pytest_simbench.scene import Pose, SceneError, Start, Trajectory
 from pytest_simbench.tasks import Log, Replaying
 from pytest_simbench.tasks.replaying import turn
 from tests.conftest import case_of, performed
-from tests.tasks.scripted_scene import SCENE, Scripted
+from tests.tasks.scripted import perform
+from tests.tasks.scripted_scene import SCENE, Moved
 from tests.tasks.test_holding import ARM
 
 NOTHING = Start((), ())
@@ -32,8 +33,7 @@ def log_of(joints: list[str], columns: int = 2) -> Log:
 def test_the_error_is_held_against_the_log_at_each_sample() -> None:
     """Joints that stand at 0 while the log goes to 1: the root mean square of a ramp is 1 / √3."""
     task = Replaying(SCENE, log_of(["hinge", "slider"]))
-    world = Scripted(SCENE, end=(0.0, 0.0))
-    metrics = task.perform(world, 1, lambda done, of: None).metrics  # type: ignore[arg-type]
+    metrics = perform(task, process=Moved(end=(0.0, 0.0)))[0].metrics
     assert metrics == pytest.approx({
         "error_hinges": math.degrees(1 / math.sqrt(3)), "worst_hinges": math.degrees(1.0),
         "error_sliders": 1000 / math.sqrt(3), "worst_sliders": 1000.0,
@@ -44,8 +44,7 @@ def test_the_error_is_held_against_the_log_at_each_sample() -> None:
 def test_the_error_is_held_against_what_was_measured_where_commands_are_known() -> None:
     seen = {"time": np.array([0.0, 1.0]), "hinge": np.array([0.25, 0.25])}
     task = Replaying(SCENE, replace(log_of(["hinge"]), told=["hinge"], seen=seen))
-    world = Scripted(SCENE, end=(0.0, 0.0))
-    metrics = task.perform(world, 1, lambda done, of: None).metrics  # type: ignore[arg-type]
+    metrics = perform(task, process=Moved(end=(0.0, 0.0)))[0].metrics
     assert metrics["error_hinges"] == pytest.approx(math.degrees(0.25))
 
 

@@ -349,11 +349,6 @@ def test_another_robot_stacks_in_the_same_world() -> None:
     assert study.gripper == replace(ur5.gripper, closed=0.02)
 
 
-@pytest.mark.parametrize("name", ["panda", "ur5", "ur10", "xarm7"])
-def test_a_built_in_robot_can_do_it(name: str) -> None:
-    assert Stacking(robot=find(name)).problem() is None
-
-
 def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
     ur5 = find("ur5")
     far = replace(ur5, base=Pose.at(-0.5, 0.0, 0.3))

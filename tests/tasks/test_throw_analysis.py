@@ -25,7 +25,7 @@ from pytest_simbench.tasks.throw_analysis import (
     may_touch,
     unclenched,
 )
-from pytest_simbench.testing.scenes import grip, with_joint
+from pytest_simbench.testing.scenes import grip
 from pytest_simbench.testing.subject import Subject
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
@@ -78,7 +78,7 @@ class Held(Throwing):
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         robot, (start, _) = self.arm, swing_of(self.arm)
         for joint, value in zip(robot.arm_joints, start, strict=True):
-            robot = with_joint(robot, joint.name, initial_position=float(value))
+            robot = robot.with_joints(joint.name, initial_position=float(value))
         held = replace(grip(robot).body("held"), name="projectile")
         return replace(super().scene(seed, jitter), robot=robot).with_body(held)
 

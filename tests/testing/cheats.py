@@ -11,8 +11,9 @@ import numpy as np
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.parity.quantities import expected_quantities
-from pytest_simbench.scene import Body, FloatArray, Scene
-from tests.laws.faults import bodies, bouncier, drives, heavier, rougher
+from pytest_simbench.scene import Body, FloatArray, Robot, Scene
+from pytest_simbench.testing.faults import of_robot
+from tests.laws.faults import bodies, bouncier, heavier, rougher
 from tests.testing.wrong import FINGERS
 
 
@@ -150,25 +151,22 @@ def with_inertia(scene: Scene) -> Scene:
     return bodies(of)(scene)
 
 
-def with_whole_weights(scene: Scene) -> Scene:
-    """Links whose weight is compensated fall."""
-    if scene.robot is None:
-        return scene
-    joints = tuple(replace(joint, gravity=1.0) for joint in scene.robot.joints)
-    return replace(scene, robot=replace(scene.robot, joints=joints))
+def of_robots(change: Callable[[Robot], Robot]) -> Lie:
+    """Another robot, where there is one."""
+    return lambda scene: scene if scene.robot is None else of_robot(change)(scene)
 
 
 def of_drives(**factors: float) -> Lie:
-    change = drives(**factors)
-    return lambda scene: scene if scene.robot is None else change(scene)
+    return of_robots(lambda robot: robot.scaled(*robot.joint_names, **factors))
 
 
-def loose(scene: Scene) -> Scene:
-    """Welds are balls and their sockets."""
-    if scene.robot is None:
-        return scene
-    closures = tuple(replace(closure, rigid=False) for closure in scene.robot.closures)
-    return replace(scene, robot=replace(scene.robot, closures=closures))
+with_whole_weights = of_robots(lambda robot: robot.with_joints(*robot.joint_names, gravity=1.0))
+"""Links whose weight is compensated fall."""
+
+loose = of_robots(
+    lambda robot: replace(robot, closures=tuple(replace(c, rigid=False) for c in robot.closures))
+)
+"""Welds are balls and their sockets."""
 
 
 ECHOES: dict[str, tuple[Lie, str]] = {

@@ -92,6 +92,14 @@ def drawing(**settings: Any) -> Iterator[None]:
         yield
 
 
+def canvas(width: float, height: float) -> Any:
+    """An empty `matplotlib.figure.Figure` of that size [in]. It is none of pyplot's: no window, no
+    display, no global state."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
 def line_style(place: int) -> dict[str, Any]:
     """Of the line of a row, by its place: other rows have other ones."""
     return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from pytest_simbench.report.figures.drawing import plain_ticks
+from pytest_simbench.report.figures.drawing import canvas, plain_ticks
 
 Point = tuple[float, float]
 """Cost and error."""
@@ -15,10 +15,9 @@ def draw(
     points: Sequence[Point], front: Sequence[Point], today: Point, cost: str, unit: str
 ) -> Any:
     """A `matplotlib.figure.Figure`, within `figures.drawing`."""
-    from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator
 
-    figure: Any = Figure(figsize=(6.0, 4.0), layout="constrained")
+    figure = canvas(6.0, 4.0)
     axis = figure.subplots()
     axis.scatter(*zip(*points, strict=True), s=12, color="0.7", label="candidates")
     axis.step(*zip(*front, strict=True), where="post", marker="o", ms=4, label="front")

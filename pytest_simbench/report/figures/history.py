@@ -19,7 +19,7 @@ from pytest_simbench.measure.history import (
 )
 from pytest_simbench.measure.intervals import interval
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
-from pytest_simbench.report.figures.drawing import COLOURS, Picture, heading, panelled
+from pytest_simbench.report.figures.drawing import COLOURS, Picture, canvas, heading, panelled
 
 SHOWN = 6
 """Panels of a picture at most: those that changed come first."""
@@ -56,14 +56,9 @@ def draw(history: TaskHistory) -> Any:
 
     A dot is a mean, the line through it its 95 % interval, a dashed line a supported change point.
     """
-    from matplotlib.figure import Figure
-
     # Those that changed, then what the study shows and the costs.
     shown = sorted(history.courses, key=lambda c: (not c.changes, not c.metric.study))[:SHOWN]
-    figure: Any = Figure(
-        figsize=(max(6.0, 2 + 0.45 * len(history.releases)), 0.9 + 1.5 * len(shown)),
-        layout="constrained",
-    )
+    figure = canvas(max(6.0, 2 + 0.45 * len(history.releases)), 0.9 + 1.5 * len(shown))
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for axis, course in zip(panels, shown, strict=True):
         _panel(axis, course)
@@ -100,13 +95,10 @@ def draw_laws(history: LawHistory) -> Any:
     laws that changed are bold.
     """
     from matplotlib.colors import to_rgb
-    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
     laws, releases = history.laws, history.releases
-    figure: Any = Figure(
-        figsize=(max(6.0, 3 + 0.5 * len(releases)), 1.6 + ROW * len(laws)), layout="constrained"
-    )
+    figure = canvas(max(6.0, 3 + 0.5 * len(releases)), 1.6 + ROW * len(laws))
     axis = figure.subplots()
     axis.imshow([[to_rgb(_colour(r)) for r in law.reached] for law in laws], aspect="auto")
     for x in range(1, len(releases)):

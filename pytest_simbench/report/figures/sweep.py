@@ -10,7 +10,7 @@ from typing import Any
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
 from pytest_simbench.measure.sweep import Point, Swept
-from pytest_simbench.report.figures.drawing import Picture, line_style, plain_ticks
+from pytest_simbench.report.figures.drawing import Picture, canvas, line_style, plain_ticks
 from pytest_simbench.report.model.sweep import labels, phenomena
 
 WIDE = 4
@@ -35,13 +35,11 @@ def pictures(found: Sequence[Swept]) -> Iterator[Picture]:
 def draw(found: Sequence[Swept], phenomenon: str, over: str) -> Any:
     """The error of each law of a phenomenon as a `matplotlib.figure.Figure`, within
     `figures.drawing`, over `step` or `cost`: a panel for each law, a line for each simulator."""
-    from matplotlib.figure import Figure
-
     laws = [law for law in found if law.phenomenon == phenomenon]
     names = labels(found)
     rows = math.ceil(len(laws) / WIDE)
     wide = min(len(laws), WIDE)
-    figure: Any = Figure(figsize=(1 + 2.9 * wide, 0.9 + 2.4 * rows), layout="constrained")
+    figure = canvas(1 + 2.9 * wide, 0.9 + 2.4 * rows)
     panels = figure.subplots(rows, wide, squeeze=False).flatten()
     for axis, law in zip(panels, laws, strict=False):
         for place, (who, name) in enumerate(names.items()):

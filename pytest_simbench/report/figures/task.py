@@ -9,7 +9,14 @@ from typing import Any
 
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
-from pytest_simbench.report.figures.drawing import COLOURS, Picture, heading, line_style, panelled
+from pytest_simbench.report.figures.drawing import (
+    COLOURS,
+    Picture,
+    canvas,
+    heading,
+    line_style,
+    panelled,
+)
 from pytest_simbench.report.model.pooling import merged_order
 from pytest_simbench.report.model.summary import Row, TaskSummary, short_labels
 
@@ -37,8 +44,6 @@ def on_page(summary: TaskSummary) -> Iterator[Picture]:
 def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
     """One picture of a task (`metrics`, `times`, `resources` or `phases`) as a
     `matplotlib.figure.Figure`, within `drawing`; None where there is nothing to draw."""
-    from matplotlib.figure import Figure
-
     rows = [row for row in summary.rows if row.finished]
     if rows and name == "metrics":  # who failed each time belongs beside the others
         rows = [row for row in summary.rows if row.finished or row.failed]
@@ -46,15 +51,13 @@ def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
         rows = [row for row in rows if row.by_phase]
     if not rows:
         return None
-    # Figure without pyplot: no window, no display, no global state.
     if name == "phases":
-        figure: Any = Figure(figsize=(9, 3.2 + 0.16 * len(rows)), layout="constrained")
+        figure = canvas(9, 3.2 + 0.16 * len(rows))
         _phases(figure, rows)
         return figure
     panels, what, fill = PICTURES[name]
     panels = panels or max(1, len(summary.study))
-    size = (max(7, 2 + 3.5 * panels), 1.6 + 0.4 * len(rows))
-    figure = Figure(figsize=size, layout="constrained")
+    figure = canvas(max(7, 2 + 3.5 * panels), 1.6 + 0.4 * len(rows))
     axes = figure.subplots(1, panels, sharey=True, squeeze=False)[0]
     fill(axes, summary, rows)
     labels = [for_figure(label) for label in short_labels(rows)]

@@ -9,7 +9,7 @@ from typing import Any
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_figure
 from pytest_simbench.measure.transfer import Transfer
-from pytest_simbench.report.figures.drawing import Picture
+from pytest_simbench.report.figures.drawing import Picture, canvas
 from pytest_simbench.report.model.document import names
 from pytest_simbench.report.model.transfer import interval
 
@@ -25,13 +25,10 @@ def pictures(found: Sequence[Transfer]) -> Iterator[Picture]:
 
 def draw(found: Transfer) -> Any:
     """The matrix as a `matplotlib.figure.Figure`, within `figures.drawing`."""
-    from matplotlib.figure import Figure
-
     known = [for_figure(name) for name in names(found.simulators)]
     many = range(len(known))
     shown = [[found.tau(i, j) for j in many] for i in many]
-    size = (1.6 + 1.1 * len(known), 1.2 + 0.7 * len(known))
-    figure: Any = Figure(figsize=size, layout="constrained")
+    figure = canvas(1.6 + 1.1 * len(known), 1.2 + 0.7 * len(known))
     axis = figure.subplots()
     # Squares and no image: the page takes vectors alone. Blue is 1, red -1.
     values = [[tau.mean for tau in row] for row in shown]

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from pytest_simbench.report.model.document import Column
 from pytest_simbench.simulator.info import Capability, SimulatorInfo
+from pytest_simbench.simulator.registry import adapter, registered
 
 MARKS: tuple[tuple[str, Capability], ...] = (
     ("window", Capability.WINDOW),
@@ -18,8 +19,9 @@ MARKS: tuple[tuple[str, Capability], ...] = (
 """Capabilities that get a column; every simulator runs headless."""
 
 
-def columns(infos: Sequence[SimulatorInfo]) -> list[Column]:
-    """A row for each simulator."""
+def columns(infos: Sequence[SimulatorInfo] = ()) -> list[Column]:
+    """A row for each simulator; without any, for all that are registered."""
+    infos = infos or [adapter(name).info for name in registered()]
 
     def marks(found: Iterable[object]) -> list[str]:
         return ["yes" if each else "-" for each in found]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pytest_simbench.measure.gate import Change, GateReport
-from pytest_simbench.measure.limits import CRASHED
+from pytest_simbench.records.metrics import CRASHED
 from pytest_simbench.records.series import short
 from pytest_simbench.report.model.document import Column, Section, Table
 

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from math import isfinite
 
 from pytest_simbench.measure.gate import GateReport
-from pytest_simbench.measure.limits import CRASHED
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.folder import RunContents
-from pytest_simbench.records.metrics import COSTS, Metric, significant
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric, significant
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import grouped
 from pytest_simbench.report.model.document import Column, Table, names

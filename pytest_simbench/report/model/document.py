@@ -5,19 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import InitVar, dataclass, field, replace
-from typing import NamedTuple
 
 from pytest_simbench.ground.text import in_one_line
+from pytest_simbench.records.record import Who
 
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
-
-
-class Of(NamedTuple):
-    """What a row is of; the page's filters show and hide by it."""
-
-    simulator: str
-    mode: str
-    profile: str
 
 
 @dataclass(frozen=True)
@@ -29,13 +21,14 @@ class Cell:
         sort: what its column is sorted by; None: by the text.
         verdict: `ahead`, `behind`, `apart`, `same`, `open` (see `answer.Standing`), or empty where
             nothing was compared.
-        of: what the row is of, in the cell that names it; None where filters do not concern it.
+        of: what the row is of, in the cell that names it: the page's filters show and hide by it;
+            None where they do not concern it.
     """
 
     lines: Sequence[str]
     sort: float | None = None
     verdict: str = ""
-    of: Of | None = None
+    of: Who | None = None
 
     @classmethod
     def made(cls, given: Content) -> Cell:

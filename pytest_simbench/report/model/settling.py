@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from itertools import combinations, groupby, pairwise
 
 from pytest_simbench.ground.versions import RELEASE, VersionedName, release_numbers
-from pytest_simbench.measure.settling import ALIKE, Ends, Settled, Who
+from pytest_simbench.measure.settling import ALIKE, Ends, Settled
 from pytest_simbench.records.metrics import significant
+from pytest_simbench.records.record import Who
 from pytest_simbench.report.model import cells
 from pytest_simbench.report.model.document import Column, Section, Table, listed, names
 

@@ -17,10 +17,10 @@ from pytest_simbench.measure.modes import compare_modes
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.phenomena import PHENOMENON
-from pytest_simbench.records.record import Failure, Record
+from pytest_simbench.records.record import Failure, Record, Who
 from pytest_simbench.records.series import comparable, grouped, series
 from pytest_simbench.records.tuned_on import published_again
-from pytest_simbench.report.model.document import Of, names
+from pytest_simbench.report.model.document import names
 from pytest_simbench.report.model.pooling import (
     COST,
     SAMPLED,
@@ -108,8 +108,8 @@ class Row:
     records: Sequence[Record] = ()
 
     @property
-    def of(self) -> Of:
-        return Of(self.simulator, self.mode, self.profile)
+    def of(self) -> Who:
+        return Who(self.simulator, self.mode, self.profile)
 
     @property
     def attempts(self) -> int:
@@ -232,7 +232,7 @@ def _undeclared(records: Sequence[Record]) -> list[Metric]:
 
 def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row:
     first, results = records[0], ResultSet(records, metrics)
-    done = [record for record in records if record.status == "ok"]
+    done = results.ok
     notes = list(dict.fromkeys(r.notes.untested for r in records if r.notes.untested))
     again = published_again((r.task, r.seed, r.notes.sample, r.notes.chosen_on) for r in done)
     notes += [again] * bool(again)
@@ -249,8 +249,8 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row
         first.profile,
         test,
         finished=len(done),
-        failed=sum(record.status == "failed" for record in records),
-        interrupted=sum(record.status == "interrupted" for record in records),
+        failed=len(results.crashed),
+        interrupted=len(results.interrupted),
         metrics={
             m.name: spread([r.value(m) for r in records], None if results.sole(m.name) else m)
             for m in metrics
@@ -263,7 +263,7 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row
         },
         by_phase=pooled_by_phase([r.resources for r in done]),
         seconds=_seconds(done),
-        causes=_causes(records),
+        causes=tuple(map(Cause, results.causes().values())),
         deviations=tuple(dict.fromkeys(text for r in records for text in r.deviations)),
         notes=tuple(notes),
         reasons=_reasons(done),
@@ -290,10 +290,3 @@ def _seconds(records: Sequence[Record]) -> dict[str, float]:
         if found:
             means[name] = statistics.fmean(found)
     return means
-
-
-def _causes(records: Sequence[Record]) -> tuple[Cause, ...]:
-    """The most frequent first."""
-    failed = (record for record in records if record.status == "failed")
-    groups = grouped(failed, lambda r: (r.error.type, r.error.phase) if r.error else None)
-    return tuple(map(Cause, sorted(groups.values(), key=len, reverse=True)))

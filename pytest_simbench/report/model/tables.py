@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
-from pytest_simbench.measure.limits import CRASHED
-from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.metrics import CRASHED, Metric
 from pytest_simbench.report.model import cells
 from pytest_simbench.report.model.answer import sentences, standing
 from pytest_simbench.report.model.document import Cell, Column, Content, Section, Table

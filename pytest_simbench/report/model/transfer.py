@@ -10,7 +10,7 @@ from pytest_simbench.measure.intervals import Interval
 from pytest_simbench.measure.transfer import METRIC, NARROW, Transfer
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.report.model import cells
-from pytest_simbench.report.model.document import Cell, Column, Of, Section, Table, listed, names
+from pytest_simbench.report.model.document import Cell, Column, Section, Table, listed, names
 from pytest_simbench.report.model.pooling import spread
 
 NAMED = 3
@@ -98,7 +98,7 @@ def interval(found: Interval) -> str:
 
 def _simulators(found: Transfer) -> Column:
     whole = zip(names(found.simulators), found.simulators, strict=True)
-    return Column("simulator", [Cell([name], of=Of(*who)) for name, who in whole], left=True)
+    return Column("simulator", [Cell([name], of=who) for name, who in whole], left=True)
 
 
 def _success(found: Transfer) -> list[Column]:

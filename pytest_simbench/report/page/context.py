@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Record, Who
 from pytest_simbench.report.figures import sweep as sweep_figures
 from pytest_simbench.report.figures import task as task_figures
 from pytest_simbench.report.figures import transfer as transfer_figures
@@ -26,7 +26,6 @@ from pytest_simbench.report.model import (
 )
 from pytest_simbench.report.model.answer import headline
 from pytest_simbench.report.model.claims import command
-from pytest_simbench.report.model.document import Of
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import Cause, Row, TaskSummary
 from pytest_simbench.report.page.pictures import drawn
@@ -59,7 +58,7 @@ def page(
     laws = len(truth.laws(summaries))
     subjects = [f"{laws} law{'s' * (laws > 1)}"] * bool(laws) + [found.task for found in tasks]
     rows = [row.of for summary in summaries for row in summary.rows]
-    choices = {name: list(dict.fromkeys(getattr(of, name) for of in rows)) for name in Of._fields}
+    choices = {name: list(dict.fromkeys(getattr(of, name) for of in rows)) for name in Who._fields}
     return {
         "claims": report.claims,
         "title": " and ".join(subjects) or ("time steps" if report.sweeps else "repeatability"),

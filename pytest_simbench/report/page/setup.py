@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from pytest_simbench.records.configuration import TASK, text
+from pytest_simbench.records.configuration import TASK, bare, text
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import told
 from pytest_simbench.report.model import tables
@@ -21,7 +21,7 @@ def setup(summaries: Sequence[TaskSummary]) -> dict[str, Any]:
     simulators: dict[tuple[str, ...], dict[str, Any]] = {}
     for summary in summaries:
         for row in summary.rows:
-            known = {key: _shown(value) for key, value in told(row.records).items()}
+            known = {key: bare(value) for key, value in told(row.records).items()}
             for name, value in _part(known, f"settings.{TASK}").items():
                 tasks.setdefault(summary.task, {}).setdefault(name, []).append(value)
             settings, versions = _part(known, "settings."), _part(known, "versions.")
@@ -48,11 +48,11 @@ def _run(records: Sequence[Record]) -> dict[str, str]:
         "protocol": _joined(record.protocol for record in records),
         "jitter": _joined(f"{record.jitter:g}" for record in records),
         "limits": _joined(
-            ", ".join(f"{k} {_shown(v)}" for k, v in r.limits.items() if v is not None)
+            ", ".join(f"{k} {bare(v)}" for k, v in r.limits.items() if v is not None)
             for r in records
         ),
         "machine": _joined(
-            ", ".join(f"{k}: {_shown(v)}" for k, v in r.host.items()) for r in records
+            ", ".join(f"{k}: {bare(v)}" for k, v in r.host.items()) for r in records
         ),
     }
     if seeds:
@@ -68,7 +68,3 @@ def _part(known: Mapping[str, str], start: str) -> dict[str, str]:
 def _joined(values: Iterable[str]) -> str:
     """Each different value once."""
     return "; ".join(dict.fromkeys(filter(None, values)))
-
-
-def _shown(value: object) -> str:
-    return value if isinstance(value, str) else text(value)

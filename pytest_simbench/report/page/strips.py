@@ -14,9 +14,8 @@ import numpy as np
 
 from pytest_simbench.ground.text import for_figure
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Record, Who
 from pytest_simbench.report.model import cells
-from pytest_simbench.report.model.document import Of
 from pytest_simbench.report.model.pooling import COST
 from pytest_simbench.report.model.summary import Row, TaskSummary
 
@@ -72,7 +71,7 @@ class StripLine:
     which are of all repetitions; and what is not drawn, if anything is not, in words."""
 
     label: str
-    of: Of
+    of: Who
     dots: Sequence[Dot]
     lost: Sequence[Dot]
     mean: float | None

@@ -145,7 +145,10 @@ def _console(width: int) -> Console:
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    """A line for each row of short texts, its columns one below the other."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    """A line for each row of short texts, its columns one below the other; what stands last in a
+    row that is shorter than others may be long."""
+    whole = max(map(len, rows))
+    ends = [row if len(row) == whole else row[:-1] for row in rows]
+    widths = [max(len(row[k]) for row in ends if k < len(row)) for k in range(whole)]
     for row in rows:
-        yield "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=True)).rstrip()
+        yield "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=False)).rstrip()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Sequence
 
 from pytest_simbench.ground.text import for_terminal, in_one_line
@@ -51,17 +50,16 @@ def sweep_lines(found: Sequence[Swept], width: int, whole: bool = False) -> list
     return lines
 
 
-def history_lines(found: Sequence[History], width: int) -> list[str]:
+def render_histories(found: Iterable[History], width: int) -> str:
     """Releases over time."""
-    result = []
-    for history in found:
-        span = f"{len(history.releases)} releases, {history.releases[0]} to {history.releases[-1]}"
-        result.append(f"{history.title}: {span}")
-        for text in history.sentences():
-            result += textwrap.wrap(
-                text, width, initial_indent="  ", subsequent_indent="    ", break_long_words=False
-            )
-    return result
+    return "\n".join(
+        _listed(
+            f"{one.title}, {len(one.releases)} releases, {one.releases[0]} to {one.releases[-1]}",
+            one.sentences(),
+            width,
+        )
+        for one in found
+    )
 
 
 def render_changes(report: GateReport, width: int, limited: bool) -> str:

@@ -21,7 +21,7 @@ from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import TaskSummary, at_own_steps, summarise
 from pytest_simbench.report.page.context import page
 from pytest_simbench.report.page.render import render
-from pytest_simbench.report.terminal.parts import history_lines, sweep_lines
+from pytest_simbench.report.terminal.parts import render_histories, sweep_lines
 from pytest_simbench.report.terminal.run import render_brief, render_run
 from tests.measure.test_law_history import asked, row
 from tests.report.samples import METRICS, failed, record, stacking_run, text, texts
@@ -205,9 +205,9 @@ def test_releases_are_told_in_lines_and_in_markdown() -> None:
         *asked("glide", "2.0", 50.0),
     ]
     found = Report.of(RunContents(records=tuple(records))).histories
-    assert history_lines(found, 60)[:2] == [
-        "engine, 3 laws (headless tuned): 4 releases, 1.2 to 2.0",
-        "  1.10: tower fails (0.1x before): WorkerHung: no answer for",
+    assert render_histories(found, 60).splitlines()[:2] == [
+        "engine, 3 laws (headless tuned), 4 releases, 1.2 to 2.0:",
+        "  1.10: tower fails (0.1x before): WorkerHung: no answer",
     ]
     written = markdown(Report(summaries(run()), histories=found))
     assert "## History: engine, 3 laws (headless tuned)\n\n- 1.10: tower fails" in written
