@@ -6,6 +6,7 @@ What a command needs is imported when it runs: `simbench --help` answers at once
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -201,14 +202,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         top.print_help(sys.stderr)
         return BAD_INPUT
     try:
-        return int(_function(functions[name])(**given))
+        status = int(_function(functions[name])(**given))
+        sys.stdout.flush()
+        return status
     except _complaints() as error:  # looked at when there is one
         return _complain(name, str(error), BAD_INPUT)
     except KeyboardInterrupt:
         return _complain(name, "interrupted; nothing that it read was changed", INTERRUPTED)
-    except BrokenPipeError:  # of `simbench list | head`
+    except OSError as error:
+        if error.errno not in (errno.EPIPE, errno.ENOSPC) or error.filename is not None:
+            raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        if error.errno == errno.EPIPE:  # of `simbench list | head`
+            return 1
+        return _complain(name, f"the output could not be written ({error.strerror})", 1)
 
 
 def _function(place: str) -> Callable[..., Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -221,6 +221,14 @@ def checked_task(value: Any, where: str) -> Task:
     from pytest_simbench.tasks.base import Task
 
     if isinstance(value, Task):
+        kind = type(value)
+        deaf = "__dataclass_params__" not in vars(kind)
+        if not is_dataclass(kind) or (deaf and vars(kind).keys() & {f.name for f in fields(kind)}):
+            name = kind.__name__
+            raise BadInput(
+                f"{where}({name}()): what the class sets counts in a dataclass alone: write "
+                f"@dataclass(frozen=True) above class {name}"
+            )
         return value
     if isinstance(value, type) and issubclass(value, Task):
         name = value.__name__

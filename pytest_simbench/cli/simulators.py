@@ -9,10 +9,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 from pytest_simbench.cli.names import read_names
+from pytest_simbench.cli.values import BadInput
 from pytest_simbench.client import environments
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.report.model.capabilities import columns
-from pytest_simbench.report.terminal.grid import aligned, render
+from pytest_simbench.report.terminal.grid import aligned, fill, render
 from pytest_simbench.simulator.registry import adapter, known, problem, registry
 from pytest_simbench.simulator.settings import Settings, in_words, meanings, searched
 
@@ -37,9 +38,11 @@ def list_simulators(
         settings: print the settings of this simulator instead.
 
     Raises:
-        BadInput: an interpreter that cannot be used.
+        BadInput: an interpreter that cannot be used, or names beside `settings`.
         SimulatorError: an unknown or broken simulator; no such cluster.
     """
+    if settings is not None and names:
+        raise BadInput("give names, or --settings SIM alone")
     if settings is not None:
         print(for_terminal("\n".join(_settings(settings))))
         return 0
@@ -85,7 +88,9 @@ def _table(missing: Missing) -> Iterator[str]:
 
 
 def _settings(name: str) -> Iterator[str]:
-    """A line for each setting; profiles of another kind (of a user's file) have a table each."""
+    """A line for each setting, with what it is below it where the terminal is too narrow; profiles
+    of another kind (of a user's file) have a table each."""
+    width = shutil.get_terminal_size((1000, 24)).columns
     of_kind: dict[type[Settings], dict[str, Settings]] = {}
     for profile, one in adapter(name).profiles.items():
         of_kind.setdefault(type(one), {})[profile] = one
@@ -97,7 +102,14 @@ def _settings(name: str) -> Iterator[str]:
         for setting, meaning in meanings(kind).items():
             values = (in_words(getattr(one, setting)) for one in profiles.values())
             rows.append((setting, *values, ", ".join(ranges.get(setting, "-")), meaning))
-        yield from aligned(rows)
+        if max(map(len, aligned(rows))) <= width:
+            yield from aligned(rows)
+            continue
+        heading, *lines = aligned([row[:-2] for row in rows])
+        yield heading
+        for line, (*_, search, meaning) in zip(lines, rows[1:], strict=True):
+            told = meaning if search == "-" else f"{meaning} Searched: {search}."
+            yield from (line, fill(f"    {told}", width, "    "))
 
 
 def _paragraphs(

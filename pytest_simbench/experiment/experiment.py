@@ -69,7 +69,10 @@ class Experiment:
     def scene(self, seed: int) -> Scene:
         """The world that the task begins with, its cubes disturbed as `--jitter` has it."""
         one, scale = Jitter(), self.case.jitter
-        return self.task.scene(seed, Jitter(one.distance * scale, one.angle * scale))
+        found: object = self.task.scene(seed, Jitter(one.distance * scale, one.angle * scale))
+        if not isinstance(found, Scene):
+            raise TypeError(f"scene() returns a Scene, not {type(found).__name__}")
+        return found
 
     @property
     def reuses_worker(self) -> bool:

@@ -19,6 +19,8 @@ from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import short
 
+__tracebackhide__ = True  # a mistake in a task is told at its own line
+
 
 class ProgressLine(Interface):
     """What the live line is told; `report.progress.Progress` is one."""

@@ -31,6 +31,8 @@ from pytest_simbench.experiment.workers import IdleWorkers
 from pytest_simbench.ground.host import host
 from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
+from pytest_simbench.records.checked import short
+from pytest_simbench.records.metrics import UnknownMetric
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure, Record, RecordError, Status
 from pytest_simbench.scene import Scene
@@ -39,6 +41,8 @@ from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.worker.stepping import CHECK_PERIOD
 from pytest_simbench.worker.wire import LONGEST, named, readable, told
+
+__tracebackhide__ = True  # a mistake in a task is told at its own line
 
 
 @dataclass(frozen=True)
@@ -158,10 +162,21 @@ class Repetition:
         """The record as a reader of its line has it, where a number that is none is None.
 
         Raises:
-            RecordError: no reader takes it, or a proportion is not in 0..1.
+            RecordError: no reader takes it, a proportion is not in 0..1, or a value has a name that
+                none of the task's metrics has, while one of these has no value.
         """
         task = self.experiment.task
-        found = Record.from_dict(record.to_dict(), f"the outcome of {task.name}")
+        names = {metric.name for metric in task.metrics}
+        if names - record.metrics.keys() and (others := record.metrics.keys() - names):
+            unknown = UnknownMetric(min(others), names, f" in the outcome of {task.name}")
+            raise RecordError(str(unknown))
+        data = record.to_dict()
+        for name, value in data["metrics"].items():
+            if not isinstance(value, float | int | None):
+                raise RecordError(
+                    f"{name} of {task.name} must be a number or None, not {short(value)}"
+                )
+        found = Record.from_dict(data, f"the outcome of {task.name}")
         for metric in task.metrics:
             value = found.metrics.get(metric.name)
             # A distance below 0 may be rounding; a share beyond 1 is a mistake.

@@ -85,7 +85,7 @@ class Judgement:
         if self.verdict is Verdict.NOT_JUDGED:
             return f"a claim needs {FEWEST} repetitions or more"
         if self.further is not None:
-            return f"about {self.further} more repetitions needed"
+            return f"about {self.further} more repetition{'s' * (self.further != 1)} needed"
         if self.claim.value in (0, 1) and self.claim.value == self.interval.mean:
             low = self.claim.relation == "at least"
             shown = self.interval.low if low else self.interval.high

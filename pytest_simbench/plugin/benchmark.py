@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -66,7 +66,7 @@ def shown(config: pytest.Config, groups: Sequence[Group]) -> Sequence[Group]:
 
 
 @pytest.fixture
-def benchmark_rounds(request: pytest.FixtureRequest, benchmark: Any) -> Any:
+def benchmark_rounds(request: pytest.FixtureRequest, benchmark: Any) -> Iterator[Any]:
     """What takes the repetitions as rounds: pytest-benchmark's fixture.
 
     A test that is run again (pytest-rerunfailures) replaces the rounds of its first attempt, which
@@ -75,10 +75,12 @@ def benchmark_rounds(request: pytest.FixtureRequest, benchmark: Any) -> Any:
     from pytest_benchmark.fixture import BenchmarkFixture
 
     if not isinstance(benchmark, BenchmarkFixture):
-        return None
+        yield None
+        return
     saved = getattr(getattr(request.config, "_benchmarksession", None), "benchmarks", [])
     saved[:] = [rounds for rounds in saved if rounds.fullname != benchmark.fullname]
-    return benchmark
+    yield benchmark
+    benchmark.skipped = True  # else it warns of a test that failed before there were rounds
 
 
 @pytest.fixture

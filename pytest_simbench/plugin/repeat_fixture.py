@@ -34,6 +34,8 @@ from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks.base import Task
 
+__tracebackhide__ = True  # a mistake in a task is told at its own line
+
 REFUSALS = (NotResumed, ExecutorError)
 """Errors whose sentences fail the test."""
 

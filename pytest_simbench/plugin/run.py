@@ -248,6 +248,11 @@ class Run:
         if problem and problem not in self._problems:
             self._problems.append(problem)
 
+    def tell_how_to_go_on(self) -> None:
+        """What completes a run that was interrupted."""
+        folder = "" if options.value(self.config, "sim_output") else f"={self.folder.path}"
+        self.tell(f"interrupted: the same command with --sim-resume{folder} completes the run")
+
     def of_test(self, test: str) -> list[str]:
         """Records of one test as JSON lines, to travel with its report: the disk may be full."""
         return [r.to_json() for r in self.folder.own if r.test == test]

@@ -278,6 +278,8 @@ class SimSession:
             return
         with self._interruptible():
             if self.begun:
+                if exitstatus == pytest.ExitCode.INTERRUPTED:
+                    self.run.tell_how_to_go_on()
                 self.run.summarise(reporter, self.comparison, exitstatus == pytest.ExitCode.OK)
             if self.comparison:
                 reporter.write_sep("=", "comparison with the baseline")

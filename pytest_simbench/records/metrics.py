@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from msgspec import Meta
 
@@ -70,7 +70,7 @@ class Metric:
             where there is none. Proportions lie in 0..1 whatever it says.
 
     Raises:
-        ValueError: a share without `of`.
+        ValueError: a share without `of`, or a kind or direction that there is not.
     """
 
     name: Word
@@ -85,6 +85,13 @@ class Metric:
     least: float | None = None
 
     def __post_init__(self) -> None:
+        for field, value, words in (
+            ("kind", self.kind, get_args(Kind)),
+            ("better", self.better, (*get_args(Better), None)),
+        ):
+            if value not in words:
+                choice = ", ".join(map(repr, words))
+                raise ValueError(f"metric {self.name!r}: {field}={value!r}; choose from {choice}")
         if self.kind == "share" and not self.of:
             raise ValueError(f"metric {self.name!r} is a share: say of how many things (of=...)")
 

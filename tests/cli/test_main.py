@@ -65,6 +65,7 @@ def test_help_loads_nothing_large() -> None:
         ("lst", "simbench: argument COMMAND: invalid choice: 'lst' (choose from 'list', *"),
         ("list nosuch", "simbench list: unknown simulator 'nosuch'; choose from *mujoco*"),
         ("list mujoco@nowhere/x", "simbench list: mujoco@nowhere/x: there is no such file; *"),
+        ("list mujoco --settings ode", "simbench list: give names, or --settings SIM alone"),
         ("list --cluster x", "*--cluster: write it as tcp://HOST:PORT or tls://HOST:PORT; *"),
         ("robots nosuch", "simbench robots: *nosuch*panda*"),
         ("install nosuch", "simbench install: unknown simulator 'nosuch'; choose from *"),
@@ -210,7 +211,24 @@ def test_a_reader_that_ends_early_is_no_fault(tmp_path: Path) -> None:
     assert found.stderr == ""
 
 
-def test_settings_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_full_disk_is_one_sentence(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "pytest_simbench", "list"]
+    environment = {**os.environ, "SIMBENCH_ENVIRONMENTS": str(tmp_path)}
+    with open("/dev/full", "w") as full:
+        found = subprocess.run(command, stdout=full, stderr=-1, text=True, env=environment)
+    told = "simbench list: the output could not be written (No space left on device)\n"
+    assert (found.returncode, found.stderr) == (1, told)
+
+
+def test_settings_are_listed(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    narrow = said(capsys, "list", "--settings", "mujoco")[1]
+    assert max(map(len, narrow.splitlines())) <= 80
+    assert "\nsolver             Newton          Newton             Newton\n" in narrow
+    assert "\n    of the constraints. Searched: PGS or CG or Newton.\n" in narrow
+    monkeypatch.delenv("COLUMNS")
     status, told, _ = said(capsys, "list", "--settings", "mujoco")
     assert status == 0
     assert "solref             0.02/1 " in told

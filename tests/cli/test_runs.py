@@ -121,6 +121,9 @@ def test_a_run_that_is_written_to_is_no_destination(here: Path) -> None:
     with pytest.raises(BadInput, match="another run is under way"):
         merge("a")
     lock.close()
+    (here / "whole").write_text("")
+    with pytest.raises(BadInput, match="whole is a file\\); give another --output$"):
+        merge("a")
 
 
 def test_damaged_lines_are_told_and_the_rest_is_joined(

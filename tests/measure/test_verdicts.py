@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -49,6 +51,7 @@ def test_the_advice_says_how_many_more_or_that_no_number_decides() -> None:
     found = judge(at_least(0.9), proportion(20, 20, 0.9))
     assert found.verdict is Verdict.INCONCLUSIVE
     assert found.advice == "about 9 more repetitions needed"
+    assert replace(found, further=1).advice == "about 1 more repetition needed"
     assert "too close" in judge(at_least(0.85), between(0.8, 0.9)).advice
 
 

@@ -15,10 +15,14 @@ from pytest_simbench.tasks import Throwing
 class Other(Falling):
     name = "other"
 
+class Longer(Falling):
+    duration = 2.0  # which the dataclass above does not hear of
+
 """
 
 TESTS = {
     "repeat(Throwing)": "repeat(Throwing) got a class instead of a task: write repeat(Throwing())",
+    "repeat(Longer())": "*write @dataclass(frozen=True) above class Longer",
     "repeat(5)": "repeat(5) takes a task, for instance repeat(Throwing())",
     "repeat(None)": "repeat(None) takes a task",
     "repeat('stacking' * 999)": "repeat('stackingstacking*...) takes a task",

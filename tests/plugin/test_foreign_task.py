@@ -174,17 +174,35 @@ def test_the_gate_and_a_resumed_run_know_it_too(
 
 GIVEN = """
     import pytest
+    from pytest_simbench.records.metrics import Metric
     from pytest_simbench.tasks.base import Outcome
     from pouring import Pouring
 
     GIVEN = {
         "nan": Outcome({"spill": float("nan")}), "share": Outcome({"caught": 1.5}),
-        "text": Outcome({"spill": "7"}), "nothing": None,
+        "text": Outcome({"spill": "7"}), "nothing": None, "typo": Outcome({"cauhgt": 1.0}),
     }
 
     @pytest.mark.parametrize("given", GIVEN)
     def test_giving(repeat, given):
         repeat(type("Giving", (Pouring,), {"perform": lambda *_: GIVEN[given]})())
+
+    class Scene(Pouring):
+        def scene(self, seed, jitter):
+            pass
+
+    class Kind(Pouring):
+        @property
+        def metrics(self):
+            return (Metric("caught", "caught", kind="shares", of=7),)
+
+    class Raising(Pouring):
+        def perform(self, world, seed, count):
+            raise ValueError("a mistake of mine")
+
+    @pytest.mark.parametrize("task", [Scene, Kind, Raising])
+    def test_task(repeat, task):
+        repeat(task())
 """
 
 
@@ -194,10 +212,18 @@ def test_an_outcome_that_no_record_can_hold_fails_its_test_and_no_other(
 ) -> None:
     pytester.makepyfile(test_it=GIVEN)
     result = run(pytester, "--reps=1", "--sim-output=a", ret=1)
-    result.assert_outcomes(passed=1, failed=3, warnings=result.parseoutcomes().get("warnings", 0))
+    result.assert_outcomes(passed=1, failed=7)  # and pytest-benchmark warns of none
     result.stdout.fnmatch_lines(
         ["FAIL mujoco, test_giving share: Failed: caught of pouring cannot be 1.5",
-         "FAIL mujoco, test_giving text: *expected 'bool | float | None', got 'str'",
-         "FAIL mujoco, test_giving nothing: *perform() returns an Outcome, not NoneType"]
+         "FAIL mujoco, test_giving text: *: spill of pouring must be a number or None, not '7'",
+         "FAIL mujoco, test_giving nothing: *perform() returns an Outcome, not NoneType",
+         "FAIL mujoco, test_giving typo: *no metric is named 'cauhgt' in the outcome of pouring; "
+         "did you mean 'caught'? *",
+         "FAIL mujoco, test_task Scene: *scene() returns a Scene, not NoneType",
+         "FAIL mujoco, test_task Kind: *metric 'caught': kind='shares'; choose from 'share', *",
+         "FAIL mujoco, test_task Raising: ValueError: a mistake of mine"]
     )  # fmt: skip
-    assert [r["metrics"] for r in records("a")] == [{"spill": None}, {}, {}, {}]
+    assert [r["metrics"] for r in records("a")] == [{"spill": None}, *[{}] * 6]
+    told = result.stdout.str()
+    assert "raise ValueError" in told
+    assert "repeater.py" not in told  # nor any other line of ours before it

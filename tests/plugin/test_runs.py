@@ -177,6 +177,8 @@ def test_interrupt_prints_the_table_and_keeps_the_records(
     if times == 1:  # more may meet pytest itself while it reports the first
         assert process.returncode == pytest.ExitCode.INTERRUPTED
         assert output.count("simulator comparison") == 1
+        assert "\ninterrupted: the same command with --sim-resume completes the run\n" in output
+        assert "PytestBenchmarkWarning" not in output
     statuses = {r["repetition"]: r["status"] for r in records(pytester.path / "out")}
     assert statuses.pop(1) == "ok"
     assert set(statuses) >= running  # and perhaps one that was just being started

@@ -125,6 +125,27 @@ def test_the_short_result() -> None:
     )
 
 
+def test_names_that_leave_no_room_stand_above_their_numbers() -> None:
+    records = [
+        record("mujoco", k, "stacking", test=f"{name}[mujoco]", function=name,
+               metrics={"placed": 1.0, "at_end": 0.9})
+        for name in ("laboratory/bench/test_towers.py::test_tall", "test_towers.py::test_low")
+        for k in range(1, 21)
+    ]  # fmt: skip
+    assert render_brief(summarise(records, METRICS), 80).partition("\n\n")[2] == text(
+        """
+        stacking: 20 repetitions each, protocol fast
+                                   at the end      CPU  RAM  x real
+          crashed       placed %            %  s/sim s   MB    time
+          ---------------------------------------------------------
+        mujoco (laboratory/bench/test_towers.py::test_tall)
+          0 of 20  100 [80, 100]  90 [72, 92]    0.048  150      20
+        mujoco (test_towers.py::test_low)
+          0 of 20  100 [80, 100]  90 [72, 92]    0.048  150      20
+        """
+    )
+
+
 @pytest.mark.parametrize("width", [80, 100, 140, 200])
 def test_every_line_fits_and_is_plain(eight: list[TaskSummary], width: int) -> None:
     """And of eight simulators at two tasks the short result is a screen."""
@@ -200,6 +221,7 @@ def test_few_repetitions_give_no_false_confidence_and_interrupted_ones_are_named
     report = render_task(summary, 100)
     assert "placed: mujoco 93 % [2, 100]." in report
     assert "at the end: mujoco 100 % [2, 100]." in report
+    assert "; of lengths, times and costs none for fewer than 5 values" in tables.LEGEND
     assert "0 of 1" in report
     assert "1 cut" in report
 

@@ -116,7 +116,10 @@ def _told(claim: Claim, claims: Sequence[Claim], metrics: Metrics) -> _Told:
     known = (*metrics.get(claim.task, ()), *COSTS, CRASHED)
     metric = next((metric for metric in known if metric.name == claim.metric), None)
     variants = {c.variant for c in claims if c.function == claim.function}
-    return _Told(claim, metric, _name(claim) if len(variants) <= MOST // 3 else _function(claim))
+    subject = _name(claim) if len(variants) <= MOST // 3 else _function(claim)
+    if any(_function(c) == _function(claim) and c.function != claim.function for c in claims):
+        subject = subject.replace(_function(claim), claim.function, 1)  # of several of that name
+    return _Told(claim, metric, subject)
 
 
 def _function(claim: Claim) -> str:

@@ -13,12 +13,12 @@ from pytest_simbench.report.model.pooling import Spread, merged_order
 from pytest_simbench.report.model.summary import PHASES, SHOWN_COSTS, Row, TaskSummary
 
 LEGEND = (
-    "min / mean / max over the finished repetitions, [95 % interval of the mean]; none for fewer "
-    "than 5 values and for values that are all alike. CPU in % of one core and RAM in MB: mean +- "
-    "deviation of worker and children, each repetition counting the same. x real time: "
-    "simulated over wall seconds of stepping; at full speed, compare CPU s per simulated s. Start "
-    "and end of the task: seconds from launch. Rows beat each other or differ where that is 95 % "
-    "certain of all outcomes together, or of all costs."
+    "min / mean / max over the finished repetitions, [95 % interval of the mean]; of lengths, "
+    "times and costs none for fewer than 5 values, nor where all are alike. CPU in % of one core "
+    "and RAM in MB: mean +- deviation of worker and children, each repetition counting the same. "
+    "x real time: simulated over wall seconds of stepping; at full speed, compare CPU s per "
+    "simulated s. Start and end of the task: seconds from launch. Rows beat each other or differ "
+    "where that is 95 % certain of all outcomes together, or of all costs."
 )
 """How to read the tables, in one paragraph."""
 
@@ -100,7 +100,7 @@ def brief(summary: TaskSummary) -> list[Column]:
     metrics, costs = others[: -len(SHOWN_COSTS)], others[-len(SHOWN_COSTS) :]
     by_name = dict(zip(SHOWN_COSTS, costs, strict=True))
     return [
-        Column("simulator", summary.names, left=True),
+        Column("simulator", summary.names, left=True, above=True),
         replace(crashed, content=[cell.lines[0] for cell in crashed.cells]),
         *(column.joined() for column in metrics),
         *(

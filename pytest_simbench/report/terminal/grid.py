@@ -36,7 +36,7 @@ def render(columns: Sequence[Column], width: int) -> str:
     single = [column.joined() for column in columns]
     if fits(single, width):
         return _draw(single, width)
-    if columns[0].above and fits([c for c in single[1:] if not c.wrap], width - NARROWEST):
+    if columns[0].above and fits_below(single, width):
         return _below(single, width)
     if any(column.wrap for column in columns):
         return _draw(single, width)
@@ -63,6 +63,12 @@ def fits(columns: Iterable[Column], width: int) -> bool:
     """Whether the columns stand side by side in that width."""
     widths = [_width(column) for column in columns]
     return sum(widths) + GAP * (len(widths) - 1) <= width
+
+
+def fits_below(columns: Sequence[Column], width: int) -> bool:
+    """Whether they do where the first one's cells stand on lines of their own."""
+    kept = [column for column in columns[1:] if not column.wrap]
+    return fits(kept, width - (GAP if len(kept) == len(columns) - 1 else NARROWEST))
 
 
 def _below(columns: Sequence[Column], width: int) -> str:

@@ -10,7 +10,7 @@ from pytest_simbench.report.model import tables, truth
 from pytest_simbench.report.model.answer import headline
 from pytest_simbench.report.model.document import Section
 from pytest_simbench.report.model.summary import TaskSummary
-from pytest_simbench.report.terminal.grid import fill, fits, render
+from pytest_simbench.report.terminal.grid import fill, fits, fits_below, render
 
 NARROWEST = 40
 """Tables are laid out for at least so many columns; in fewer, lines run over."""
@@ -81,7 +81,9 @@ def render_brief(summaries: Sequence[TaskSummary], width: int = 80) -> str:
     parts.append("\n".join(fill(sentence, width, "  ") for sentence in headline(tasks)))
     for summary in tasks:
         title, columns = fill(in_one_line(tables.title(summary)), width), tables.brief(summary)
-        while len(columns) > 2 and not fits(columns, width):
+        long = not fits(columns[:1], width // 2)  # such names stand above their rows
+        fit = fits_below if long else fits
+        while len(columns) > 2 and not fit(columns, width):
             columns.pop()  # the least important ones come last
         parts.append(f"{title}\n{render(columns, width)}")
     text = "\n\n".join(filter(None, parts))

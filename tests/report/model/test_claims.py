@@ -69,6 +69,13 @@ def test_the_first_line_says_pass_or_fail_and_how_many_crashed() -> None:
         assert claims_of(reading(*claims)).sentence.startswith(sentence)
 
 
+def test_tests_of_one_name_are_told_apart() -> None:
+    names = (STACK, STACK.replace("::", "::TestTall::"))
+    both = [claim(test=f"{name}[mujoco-headless]", function=name) for name in names]
+    column = claims_of(reading(*both)).table.columns[0]
+    assert [cell.text for cell in column.cells] == [f"{name}: placed >= 90 %" for name in names]
+
+
 def test_a_limit_against_the_baseline_that_is_exceeded_is_a_claim_that_fails() -> None:
     gate = GateReport(broken=("test_x: nothing finished",))
     found = claims_of(reading(claim()), gate)
