@@ -24,7 +24,6 @@ from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import Scene
 from pytest_simbench.tasks import Holding, Reaching, Settling, Stacking
 from tests.cluster.test_pool import A, Told
-from tests.tasks.scripted_scene import SCENE
 from tests.tiny import Falling
 
 
@@ -46,11 +45,6 @@ def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
     command = [sys.executable, "-P", "-c", code]
     out = subprocess.run(command, input=packed, capture_output=True, check=True, cwd="/").stdout
     assert out.decode().strip() == "Falling(duration=0.25) ['landed']"
-
-
-def test_a_task_whose_robot_is_its_scenes_travels_with_that(case: Case) -> None:
-    packed = Job.of(Experiment(case, Holding(SCENE))).pack().data
-    assert Job.unpack(packed or b"").task == Holding(SCENE)
 
 
 @pytest.mark.parametrize("name", ["still", "wrapped"])
