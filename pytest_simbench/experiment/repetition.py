@@ -24,6 +24,7 @@ from pytest_simbench.client.resources import ResourceSampler
 from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.client.world import TRACE_PERIOD, World
 from pytest_simbench.experiment.camera import Camera
+from pytest_simbench.experiment.ending import checked, failure, status
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import file_stem, record_of, settings
 from pytest_simbench.experiment.interrupts import Interrupts
@@ -31,16 +32,14 @@ from pytest_simbench.experiment.workers import IdleWorkers
 from pytest_simbench.ground.host import host
 from pytest_simbench.recordings import film
 from pytest_simbench.recordings.trace import FOLDER, Trace
-from pytest_simbench.records.checked import short
-from pytest_simbench.records.metrics import UnknownMetric
 from pytest_simbench.records.notes import Notes
-from pytest_simbench.records.record import Failure, Record, RecordError, Status
+from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.scene import Scene
 from pytest_simbench.scene.policy import Kinematics
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.worker.stepping import CHECK_PERIOD
-from pytest_simbench.worker.wire import LONGEST, named, readable, told
+from pytest_simbench.worker.wire import named
 
 __tracebackhide__ = True  # a mistake in a task is told at its own line
 
@@ -153,36 +152,11 @@ class Repetition:
         }
         record = self._record(outcome, error, resources)
         try:
-            record = self._checked(record) if error is None and self.number else record
+            if error is None and self.number:
+                record = checked(record, self.experiment.task)
         except RecordError as wrong:
             record, error = self._record(Outcome(), wrong, resources), wrong
         return record.noting(**noted), error
-
-    def _checked(self, record: Record) -> Record:
-        """The record as a reader of its line has it, where a number that is none is None.
-
-        Raises:
-            RecordError: no reader takes it, a proportion is not in 0..1, or a value has a name that
-                none of the task's metrics has, while one of these has no value.
-        """
-        task = self.experiment.task
-        names = {metric.name for metric in task.metrics}
-        if names - record.metrics.keys() and (others := record.metrics.keys() - names):
-            unknown = UnknownMetric(min(others), names, f" in the outcome of {task.name}")
-            raise RecordError(str(unknown))
-        data = record.to_dict()
-        for name, value in data["metrics"].items():
-            if not isinstance(value, float | int | None):
-                raise RecordError(
-                    f"{name} of {task.name} must be a number or None, not {short(value)}"
-                )
-        found = Record.from_dict(data, f"the outcome of {task.name}")
-        for metric in task.metrics:
-            value = found.metrics.get(metric.name)
-            # A distance below 0 may be rounding; a share beyond 1 is a mistake.
-            if value is not None and metric.bounded and not metric.holds(value):
-                raise RecordError(f"{metric.name} of {task.name} cannot be {value:g}")
-        return found
 
     def _ended(self) -> tuple[Any, BaseException | None]:
         """What the task found, or what it raised; nothing interrupts from here on."""
@@ -331,10 +305,10 @@ class Repetition:
         return record_of(
             self.experiment,
             self.number,
-            status=_status(error),
+            status=status(error),
             settings=self._constructed.settings or settings(case),
             versions={**({"python": python} if python else {}), **self._constructed.versions},
-            error=None if error is None else _failure(error, self.where),
+            error=None if error is None else failure(error, self.where),
             metrics=outcome.metrics,
             details=outcome.details,
             notes=notes,
@@ -416,18 +390,3 @@ def group(phase: str) -> str:
     words = phase.split(" ")
     counted = (k for k, word in enumerate(words) if word == "cube" or word[:1].isdigit())
     return " ".join(words[: next(counted, len(words))]) or phase
-
-
-def _status(error: BaseException | None) -> Status:
-    """`interrupted` is what somebody ended from outside, and only that: it may be run again."""
-    if error is None:
-        return "ok"
-    outside = isinstance(error, Interrupted) or not isinstance(error, Exception)
-    return "interrupted" if outside else "failed"
-
-
-def _failure(error: BaseException, where: Where) -> Failure:
-    if isinstance(error, WorkerError):
-        message = readable(error.what, 2 * LONGEST)  # shortened where it arose
-        return Failure(type(error).__name__, message, error.phase, error.log_tail)
-    return Failure(readable(type(error).__name__), told(error), where.phase)
