@@ -91,9 +91,13 @@ class TaskHistory(History):
     courses: tuple[MetricCourse, ...] = field(default=())
 
     def sentences(self) -> list[str]:
-        """What changed with which release, how much, and how sure; and which releases crashed."""
+        """What changed with which release, how much, and how sure; what some releases have no value
+        of; and which releases crashed."""
         found = []
         for course in self.courses:
+            sides = zip(self.releases, self.results, course.values, strict=True)
+            if absent := [v for v, result, values in sides if result.ok and not values]:
+                found.append(f"{course.metric.title} has no value with {', '.join(absent)}")
             present = [v for v, values in zip(self.releases, course.values, strict=True) if values]
             metric = course.metric
             for change in course.changes:

@@ -72,6 +72,12 @@ def test_a_release_that_fails_is_named_with_its_message() -> None:
     )
 
 
+def test_a_release_without_a_value_of_a_metric_is_named() -> None:
+    gone = [replace(r, metrics={}) for r in release("3", 1.0)]
+    (history,) = histories([*release("1", 1.0), *release("2", 1.0), *gone], {"stacking": METRICS})
+    assert history.sentences() == ["placed has no value with 3"]
+
+
 def test_the_one_value_that_all_repetitions_would_have_changes_for_certain() -> None:
     levels = (("1", 1.0), ("2", 1.0), ("3", 0.6), ("4", 0.6))
     found = [
