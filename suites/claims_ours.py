@@ -2,15 +2,7 @@
 tests too."""
 
 import pytest
-from pytest_simbench.suites.claimed import (
-    DIFFERENCE,
-    LOADS,
-    STEPS,
-    TOWERS,
-    Pile,
-    Restored,
-    apart,
-)
+from pytest_simbench.suites.claimed import DIFFERENCE, LOADS, STEPS, TOWERS, Pile, Restored, apart
 from pytest_simbench.suites.referee import DRAWS, Drawn, claim
 
 from pytest_simbench.laws import LAWS

@@ -21,12 +21,7 @@ from pytest_simbench.cli.selection import (
 )
 from pytest_simbench.cli.values import BadInput, BadValue, refusing
 from pytest_simbench.client.display import Displays
-from pytest_simbench.client.errors import (
-    DisplayError,
-    ExecutorError,
-    Unavailable,
-    WorldParityError,
-)
+from pytest_simbench.client.errors import DisplayError, ExecutorError, Unavailable, WorldParityError
 from pytest_simbench.experiment.case import PROTOCOLS
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment

@@ -11,13 +11,7 @@ from typing import Any
 from typing import Protocol as Interface
 
 from pytest_simbench.client.answers import Constructed
-from pytest_simbench.client.errors import (
-    DisplayError,
-    DisplayLost,
-    Interrupted,
-    Where,
-    WorkerError,
-)
+from pytest_simbench.client.errors import DisplayError, DisplayLost, Interrupted, Where, WorkerError
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.resources import ResourceSampler

@@ -8,15 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from pytest_simbench.laws.base import (
-    GRAVITY,
-    Law,
-    Reading,
-    Watched,
-    held,
-    solved,
-    stillness,
-)
+from pytest_simbench.laws.base import GRAVITY, Law, Reading, Watched, held, solved, stillness
 from pytest_simbench.laws.contact import tilt
 from pytest_simbench.laws.mechanisms import STRONG, Part, mechanism
 from pytest_simbench.laws.sticking import SHARES, fan

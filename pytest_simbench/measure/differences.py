@@ -22,13 +22,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pytest_simbench.measure.comparison import (
-    ALPHA,
-    MARGIN,
-    PERMUTATIONS,
-    FloatArray,
-    equivalence,
-)
+from pytest_simbench.measure.comparison import ALPHA, MARGIN, PERMUTATIONS, FloatArray, equivalence
 from pytest_simbench.measure.intervals import SEED, varies
 from pytest_simbench.measure.speed import POWER, control, evened
 from pytest_simbench.records.metrics import COSTS, CRASHED, Metric

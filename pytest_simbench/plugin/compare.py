@@ -14,12 +14,7 @@ from pytest_simbench.ground.versions import base_name
 from pytest_simbench.measure.gate import GateReport, gate_runs, side_by_side
 from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
 from pytest_simbench.plugin import options
-from pytest_simbench.records.baseline import (
-    FORMS,
-    BaselineError,
-    from_benchmarks,
-    read_baseline,
-)
+from pytest_simbench.records.baseline import FORMS, BaselineError, from_benchmarks, read_baseline
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric, UnknownMetric
 from pytest_simbench.report.markdown.run import render_section

@@ -21,14 +21,7 @@ from pytest_simbench.data.pushes import COMMANDS, FREE, PUSH, ArmRun, Command
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import FloatArray, Pose, Robot, Scene, Trajectory
-from pytest_simbench.tasks.arm_pushing import (
-    CUBE,
-    CUBE_SIZE,
-    JOINTS,
-    MicoTask,
-    marker,
-    yaw,
-)
+from pytest_simbench.tasks.arm_pushing import CUBE, CUBE_SIZE, JOINTS, MicoTask, marker, yaw
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 
 CONTROL_PERIOD, GAIN, FASTEST = 0.05, 10.0, math.radians(30.0)

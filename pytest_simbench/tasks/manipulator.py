@@ -10,14 +10,7 @@ import numpy as np
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError
-from pytest_simbench.motion.grasping import (
-    CLEARANCE,
-    GRASP_LINK,
-    Choice,
-    Grasp,
-    choose,
-    grasp_of,
-)
+from pytest_simbench.motion.grasping import CLEARANCE, GRASP_LINK, Choice, Grasp, choose, grasp_of
 from pytest_simbench.motion.grips import grips, turns
 from pytest_simbench.motion.kinematics import top_down_grasps
 from pytest_simbench.motion.model import RobotModel

@@ -24,13 +24,7 @@ from pytest_simbench.motion.errors import PlanningError, RobotError
 from pytest_simbench.motion.grasping import grasping
 from pytest_simbench.motion.model import RobotModel, grasping_scale_of
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.motion.throw import (
-    LANDING_HEIGHT,
-    Throw,
-    feasible_swing,
-    released,
-    swing_of,
-)
+from pytest_simbench.motion.throw import LANDING_HEIGHT, Throw, feasible_swing, released, swing_of
 from pytest_simbench.motion.timing import synchronised_move
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import STANDARD_GRAVITY, Pose, Robot, Scene

@@ -15,11 +15,7 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Robot, Trajectory, Vector3
 from pytest_simbench.simulator import Capability, PreparedRobot
 from pytest_simbench.testing import scenes
-from pytest_simbench.testing.drives import (
-    has_armature,
-    own_inertia,
-    require_limit_reached,
-)
+from pytest_simbench.testing.drives import has_armature, own_inertia, require_limit_reached
 from pytest_simbench.testing.kit import any_robot, check
 from pytest_simbench.testing.subject import Subject, asked, require, require_close
 

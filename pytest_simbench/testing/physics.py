@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.laws.drives import StepResponse
-from pytest_simbench.laws.free import (
-    rotation_of,
-)
+from pytest_simbench.laws.free import rotation_of
 from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
 from pytest_simbench.laws.sliding import SlideX, block
 from pytest_simbench.scene import (

@@ -31,11 +31,7 @@ from pytest_simbench.parity.readback import remembering
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
-from pytest_simbench.simulator.info import (
-    alternatives,
-    check_supported,
-    importable,
-)
+from pytest_simbench.simulator.info import alternatives, check_supported, importable
 from pytest_simbench.simulator.settings import changed
 from pytest_simbench.worker.loop import Loop, told_forces
 from pytest_simbench.worker.loop import inside as run_inside
@@ -48,15 +44,7 @@ from pytest_simbench.worker.state import (
 )
 from pytest_simbench.worker.stepping import Acting, Stepper
 from pytest_simbench.worker.watching import Watch
-from pytest_simbench.worker.wire import (
-    LONGEST_LOGGED,
-    Frames,
-    named,
-    pack,
-    readable,
-    told,
-    unpack,
-)
+from pytest_simbench.worker.wire import LONGEST_LOGGED, Frames, named, pack, readable, told, unpack
 
 
 def peak_rss_mb() -> float | None:

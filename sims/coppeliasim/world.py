@@ -17,16 +17,7 @@ import numpy as np
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.mesh_check import read_stl
 from pytest_simbench.description.urdf import Link, MovingJoint, Shape
-from pytest_simbench.scene import (
-    Body,
-    Box,
-    Capsule,
-    ConvexMesh,
-    Cylinder,
-    FloatArray,
-    Pose,
-    Sphere,
-)
+from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, FloatArray, Pose, Sphere
 from pytest_simbench.scene.pose import turn_of_z
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 

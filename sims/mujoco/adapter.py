@@ -18,13 +18,7 @@ from numpy.typing import NDArray
 from pytest_simbench.description.carried import Carried
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.scene.overlap import rotated, rotations
-from pytest_simbench.simulator import (
-    Capability,
-    Deviation,
-    Simulator,
-    SimulatorInfo,
-    lazy_import,
-)
+from pytest_simbench.simulator import Capability, Deviation, Simulator, SimulatorInfo, lazy_import
 
 from .bounces import BOUNCES
 from .own_file import FileReadBack, OwnFile, loaded

@@ -15,16 +15,7 @@ import numpy as np
 
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
 from pytest_simbench.description.urdf import ROOT
-from pytest_simbench.scene import (
-    Body,
-    Compound,
-    FloatArray,
-    Pose,
-    Scene,
-    SceneError,
-    Start,
-    Wrench,
-)
+from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene, SceneError, Start, Wrench
 from pytest_simbench.scene.checks import FORBIDDEN, RESERVED
 from pytest_simbench.scene.pose import quaternion_of, vector3
 from pytest_simbench.scene.scene import ROOM

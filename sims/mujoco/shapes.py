@@ -8,16 +8,7 @@ import numpy as np
 
 from pytest_simbench.description.carried import APPROXIMATED
 from pytest_simbench.description.shapes import directions
-from pytest_simbench.scene import (
-    Body,
-    Box,
-    Capsule,
-    ConvexMesh,
-    Cylinder,
-    Pose,
-    Sphere,
-    principal,
-)
+from pytest_simbench.scene import Body, Box, Capsule, ConvexMesh, Cylinder, Pose, Sphere, principal
 from pytest_simbench.scene.polytope import MOST
 from pytest_simbench.simulator import DescriptionError, lazy_import
 

@@ -8,14 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.records.paths import (
-    FolderError,
-    inside,
-    new_name,
-    opened,
-    whole,
-    write_whole,
-)
+from pytest_simbench.records.paths import FolderError, inside, new_name, opened, whole, write_whole
 
 
 def test_runs_of_one_second_have_different_folders(tmp_path: Path) -> None:

@@ -24,13 +24,7 @@ from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report.files import (
-    Written,
-    csv_of,
-    write_badge,
-    write_files,
-    write_tables,
-)
+from pytest_simbench.report.files import Written, csv_of, write_badge, write_files, write_tables
 from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
 from pytest_simbench.report.markdown.run import render_run, render_task
 from pytest_simbench.report.model import tables
