@@ -93,13 +93,13 @@ def give_rounds(
 ) -> None:
     """Hand the finished repetitions to pytest-benchmark as rounds of worker seconds.
 
-    pytest-benchmark has one result for a test: rounds are those of its first task. The records are
-    of all its tasks.
+    pytest-benchmark has one result for a test: rounds are those of its first task of which any
+    finished. The records are of all its tasks.
     """
     from pytest_simbench.records import baseline
 
-    result = results[0]
-    if not result.ok:
+    result = next((result for result in results if result.ok), None)
+    if result is None:
         return
     seconds = iter([record.stepping["wall"] for record in result.ok])
 

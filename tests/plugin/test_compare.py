@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,6 +12,7 @@ from xml.etree import ElementTree
 import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
+from pytest_simbench.records.baseline import read_baseline
 from tests.plugin.inner import run_before, run_pytest
 
 TEST = """
@@ -73,6 +75,21 @@ def test_a_worse_run_fails_with_one_sentence(
     assert "- FAILED test\\_falling\\[mujoco-headless\\]: landed fell from 100 % to 0 %" in written
     assert "| test\\_falling\\[mujoco-headless\\] | landed | 100 % | 0 % |" in written
     assert written.count("## falling: 5 repetitions") == 1
+
+
+def test_a_first_task_that_never_finishes_hides_no_other_one(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile("""
+        from tests.tiny import Falling
+
+        def test_both(repeat):
+            repeat(Falling(1e6)), repeat(Falling())
+    """)
+    words = "--sim=mujoco --reps=1 --sim-timeout=1 --benchmark-json=b.json"
+    run_pytest(pytester, words, failed=1)
+    saved = pytester.path / "b.json"
+    (rounds,) = json.loads(saved.read_text())["benchmarks"]
+    assert (rounds["stats"]["rounds"], rounds["extra_info"]["metrics"]) == (1, {"landed": [1.0]})
+    assert [record.status for record in read_baseline(saved).records] == ["failed", "ok"]
 
 
 def test_the_same_again_passes_and_says_so(pytester: pytest.Pytester, baseline: Path) -> None:

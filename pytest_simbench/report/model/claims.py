@@ -132,12 +132,15 @@ def _name(claim: Claim) -> str:
 
 def _that_count(found: Sequence[Claim], crashed: Collection[str]) -> list[Claim]:
     """The last of each; of a test as a whole, only that it failed and no claim of it says why. What
-    an earlier attempt of a test said of crashes counts no more where its last one has none."""
+    failed counts no more where the resumed test passed as a whole, nor what an earlier attempt of
+    a test said of crashes where its last one has none."""
     every = {claim.identity: claim for claim in found}.values()
+    passed = {claim.test for claim in every if not claim.metric and claim.verdict == "PASS"}
     last = [
         claim
         for claim in every
-        if (claim.metric, claim.verdict) != (CRASHED.name, "FAIL") or claim.test in crashed
+        if claim.verdict != "FAIL"
+        or (claim.test not in passed and (claim.metric != CRASHED.name or claim.test in crashed))
     ]
     failed = {claim.test for claim in last if claim.metric and claim.verdict == "FAIL"}
     return [

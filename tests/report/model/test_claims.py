@@ -119,6 +119,15 @@ def test_crashes_of_an_earlier_attempt_count_no_more() -> None:
     assert claims_of(reading(first, claim(), records=crashed)).state == "FAIL"
 
 
+def test_what_failed_before_a_resumed_test_passed_counts_no_more() -> None:
+    """Resumed with another limit on crashes, or none, a test makes no such claim again."""
+    crashed, first = (*RECORDS, stacked("mujoco", 3, None)), claim(metric="crashed", verdict="FAIL")
+    whole = claim(task="", metric="", relation=None, threshold=None, mean=None)
+    assert claims_of(reading(first, claim(), whole, records=crashed)).state == "PASS"
+    failed = replace(whole, verdict="FAIL", advice="again")
+    assert claims_of(reading(whole, first, failed, records=crashed)).state == "FAIL"
+
+
 def test_a_test_that_failed_as_a_whole_is_told_unless_a_claim_of_it_says_why() -> None:
     whole = claim("drake", "FAIL", task="", metric="", relation=None, threshold=None, mean=None,
                   advice="KeyError: 'x'")  # fmt: skip
