@@ -124,7 +124,6 @@ SLOW = {
     "test_planted_values_are_found_and_intervals_cover",
     "test_shrinks_to_the_smallest_amount",
     "test_the_file_has_what_the_command_finds",
-    "test_the_order_of_the_cubes_is_by_seed",
     "test_the_shares_are_of_all_places_also_of_those_never_filled",
     "test_without_a_change_one_row_in_twenty_has_one_at_most",
 }

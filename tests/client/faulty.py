@@ -85,7 +85,7 @@ class Restless(Simulator):
     """Does not put the clock back when it loads again."""
 
     def load(self, scene: Scene) -> None:
-        super().load(scene)  # type: ignore[safe-super]
+        super().load(scene)
         Restless.loads += 1
         for _ in range(Restless.loads - 1):
             self.step()
@@ -105,14 +105,14 @@ LIES: dict[str, dict[str, Any]] = {
     "untested": {"untested": lambda self: 3},
     "settings": {"profiles": {"tuned": OddSettings(0.001)}},
     "deviations": {
-        "info": replace(MuJoCo.info, deviations=(*MuJoCo.info.deviations, Deviation("", 3))),  # type: ignore[arg-type]
+        "info": replace(MuJoCo.info, deviations=(*MuJoCo.info.deviations, Deviation("", 3))),
     },
     "no dict of versions": {"versions": lambda self: 3},
     "versions that cannot be sent": {
         "versions": lambda self: {"mujoco": "3.3", "numpy": Unprintable}
     },
     "bodies": {"body_state": lambda self: MuJoCo.body_state(self)[:-1]},
-    "time": {"time": property(lambda self: min(0.3, MuJoCo.time.fget(self)))},  # type: ignore[attr-defined]
+    "time": {"time": property(lambda self: min(0.3, MuJoCo.time.fget(self)))},
     "joints": {"joint_state": lambda self: MuJoCo.joint_state(self)[:, [2, 1, 0, *range(3, 9)]]},
 }
 """What an adapter says, of another type than it must be."""
@@ -192,7 +192,7 @@ class Faulty(Simulator):
     fault: Callable[[Any], object]
 
     def step(self) -> None:
-        super().step()  # type: ignore[safe-super]  # the engine comes next in the method order
+        super().step()  # the engine comes next in the method order
         if self.time >= FAULT_TIME and not self.done:
             self.done = bool(self.fault())
 

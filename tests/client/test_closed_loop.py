@@ -19,14 +19,13 @@ from pytest_simbench.client.errors import PolicyFailed, Where, WorkerExited
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.motion.kinematics import Servo
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.scene.policy import Command, LoopError, Observation, Policy
 from pytest_simbench.tasks import Reaching
 from pytest_simbench.tasks.base import cube
+from tests.client.failing import failure
 from tests.client.waving import Waving, still, writing
 
 SCENE = Scene("arm", (cube("a", Pose.at(0.5, 0.3, 0.025), (1.0,) * 4),), panda())
@@ -53,8 +52,9 @@ def test_inside_the_worker_by_message_or_by_socket_it_is_the_same_to_the_last_bi
 ) -> None:
     ends = []
     for inside in (False, False, True):
-        one = world()
-        motion = one.control(Waving(0.3), until=0.5, inside=inside)
+        one, policy = world(), Waving(0.3)
+        motion = one.control(policy, until=0.5, inside=inside)
+        assert policy.seed == (0 if inside else 7)  # the repetition's; inside it is a copy's
         assert motion.time == pytest.approx(np.arange(1, 26) * 0.02)
         ends.append((one.time, one.joints.tobytes(), one.bodies.tobytes()))
     monkeypatch.setattr(connection, "elsewhere", lambda spec: True)
@@ -63,12 +63,6 @@ def test_inside_the_worker_by_message_or_by_socket_it_is_the_same_to_the_last_bi
     ends.append((far.time, far.joints.tobytes(), far.bodies.tobytes()))
     assert len(set(ends)) == 1
     assert abs(far.joints[0, 3] - panda().joints[3].initial_position) > 0.05
-
-
-def test_its_episode_begins_with_the_repetitions_seed(world: Worlds) -> None:
-    policy = Waving(0.3)
-    world().control(policy, until=0.1)
-    assert policy.seed == 7
 
 
 def seen_by(world: World, **options: Any) -> list[Observation]:
@@ -201,19 +195,14 @@ def test_what_it_sees_is_not_for_writing(world: Worlds, inside: bool) -> None:
 
 
 def test_a_repetition_fails_alone(case: Case) -> None:
-    record, error = Repetition(Experiment(case, Reaching(Failing("raises"))), 1).run()
-    assert record.status == "failed"
-    assert isinstance(error, PolicyFailed)
-    assert record.error is not None
-    assert (record.error.type, record.error.phase) == ("PolicyFailed", "act")
-    assert record.error.message.startswith("the policy failing raised RuntimeError: the network")
+    kind, phase, message = failure(case, Reaching(Failing("raises")))
+    assert (kind, phase) == ("PolicyFailed", "act")
+    assert message.startswith("the policy failing raised RuntimeError: the network")
 
 
 def test_a_worker_that_dies_is_told(world: Worlds) -> None:
     one = world()
-    pid = one.process.pid
-    assert pid is not None
-    threading.Timer(0.5, os.kill, (pid, signal.SIGKILL)).start()
+    threading.Timer(0.5, os.kill, (one.process.pid, signal.SIGKILL)).start()
     with pytest.raises(WorkerExited, match="SIGKILL"):
         one.control(still, until=1e5)
 
@@ -263,7 +252,7 @@ def test_a_script_does_not_start_itself_again(
 
 def test_what_does_not_travel(world: Worlds) -> None:
     policy = Waving(0.1)
-    policy.lock = threading.Lock()  # type: ignore[attr-defined]
+    policy.lock = threading.Lock()
     with pytest.raises(PolicyFailed, match="holds lock, which cannot go to the worker"):
         world().control(policy, until=0.1, inside=True)
 
@@ -271,7 +260,6 @@ def test_what_does_not_travel(world: Worlds) -> None:
 @pytest.mark.parametrize("fault", ["Forks", "ForksOn"])
 def test_an_engine_that_forks_is_not_asked_by_two(case: Case, fault: str) -> None:
     forking = replace(case, adapter=f"tests.client.faulty:{fault}")
-    record, _ = Repetition(Experiment(forking, Reaching(still, seconds=1.0)), 1).run()
-    assert record.error is not None
-    assert record.error.type == "ProtocolError"
-    assert "an engine forks" in record.error.message
+    kind, _, message = failure(forking, Reaching(still, seconds=1.0))
+    assert kind == "ProtocolError"
+    assert "an engine forks" in message

@@ -21,9 +21,9 @@ from pytest_simbench.client.errors import Where
 from pytest_simbench.client.launch import Launch
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.worker.wire import Frames
+from tests.client.failing import failure
+from tests.conftest import performed
 from tests.tiny import Falling
 
 
@@ -34,8 +34,7 @@ def test_modules_of_the_current_folder_are_not_imported(
     for name in ("queue", "tempfile", "ctypes", "struct", "json"):
         (tmp_path / f"{name}.py").write_text("raise RuntimeError('stray')")
     monkeypatch.chdir(tmp_path)
-    record, error = Repetition(Experiment(case, Falling()), 1).run()
-    assert (record.status, error) == ("ok", None)
+    performed(case, Falling())
 
 
 RAISES = """
@@ -68,7 +67,6 @@ def test_an_error_that_nobody_asked_for_is_not_printed(tmp_path: Path) -> None:
 def test_the_mark_that_ends_a_loop_is_read_before_the_answer_that_is_here_already() -> None:
     """Else the next loop's first question came four bytes late: numbers, but not the state's."""
     connection = Connection(None, None, {}, None)
-    assert connection._theirs is not None
     theirs = Frames(connection._theirs)
     theirs.send(b"")
     connection._arrived("answer")
@@ -121,9 +119,7 @@ def host(tmp_path: Path) -> Iterator[str]:
 
 
 def test_another_host(case: Case, host: str) -> None:
-    local, _ = Repetition(Experiment(case, Falling()), 1).run()
-    remote, error = Repetition(Experiment(replace(case, spec=host), Falling()), 1).run()
-    assert error is None
+    local, remote = (performed(replace(case, spec=spec), Falling()) for spec in (case.spec, host))
     assert remote.metrics == local.metrics
     assert remote.versions == local.versions
     assert remote.resources.get("rss_mb") is None  # its processes cannot be watched from here
@@ -134,7 +130,6 @@ def test_a_host_without_this_run_folder(case: Case, tmp_path: Path) -> None:
     launch = Launch(case.adapter, log=tmp_path / "not here" / "worker.log")
     process = WorkerProcess(launch, Where("mujoco", "headless"))
     assert process.request("hello")["pid"] == process.pid
-    assert process.pid is not None
     folder = Path(psutil.Process(process.pid).cwd())
     assert folder.name.startswith("simbench-")
     assert (folder / "worker.log").exists()
@@ -144,16 +139,12 @@ def test_a_host_without_this_run_folder(case: Case, tmp_path: Path) -> None:
 
 def test_an_unknown_host(case: Case) -> None:
     spec = "ssh=-o ConnectTimeout=2 no-such-host.invalid//python=python3"
-    record, _ = Repetition(
-        Experiment(replace(case, spec=spec, stall_timeout=10.0), Falling()), 1
-    ).run()
-    assert record.error is not None
-    assert record.error.type == "WorkerStartError"
-    assert "no-such-host.invalid" in record.error.message
+    kind, _, message = failure(replace(case, spec=spec, stall_timeout=10.0))
+    assert kind == "WorkerStartError"
+    assert "no-such-host.invalid" in message
 
 
 def test_a_popen_specification(case: Case) -> None:
     spec = f"popen//execmodel=main_thread_only//python={sys.executable}"
-    record, error = Repetition(Experiment(replace(case, spec=spec), Falling()), 1).run()
-    assert (record.status, error) == ("ok", None)
+    record = performed(replace(case, spec=spec), Falling())
     assert record.resources["rss_mb"]["peak"] > 20

@@ -26,6 +26,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.tasks.base import Count, Outcome
 from tests.client.test_reaper import gone
+from tests.conftest import ADAPTERS
 from tests.tiny import Falling
 
 pytestmark = pytest.mark.skipif(
@@ -51,6 +52,7 @@ def test_one_for_all_and_gone_at_the_end(displays: Displays) -> None:
     assert displays.environment() == first
     (server,) = servers()
     assert displays.problem(first) == ""
+    assert os.getsid(server.pid) != os.getsid(0)  # Ctrl-C is not for it
     displays.close()
     assert not server.is_running()
 
@@ -87,12 +89,6 @@ def test_one_that_died_is_told_and_replaced(displays: Displays) -> None:
     assert displays.problem(again) == ""
 
 
-def test_ctrl_c_is_not_for_it(displays: Displays) -> None:
-    displays.environment()
-    (server,) = servers()
-    assert os.getsid(server.pid) != os.getsid(0)
-
-
 @pytest.mark.parametrize("script", ["exit 3", "exec sleep 600"], ids=["ends", "says nothing"])
 def test_one_that_does_not_start(
     displays: Displays, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str
@@ -122,13 +118,10 @@ class Blinded(Falling):
 def test_the_repetition_whose_display_died_fails_and_the_next_has_another(
     case: Case, displays: Displays, engine: str
 ) -> None:
-    from tests.conftest import ADAPTERS
-
     case = replace(case, mode="gui", display=displays, simulator=engine, adapter=ADAPTERS[engine])
     records = [Repetition(Experiment(case, Blinded()), number).run()[0] for number in (1, 2)]
     assert [record.status for record in records] == ["failed", "ok"]
     error = records[0].error
-    assert error is not None
     assert error.type == "DisplayLost"
     assert "(Xvfb) was killed by SIGKILL" in error.message
 
@@ -147,7 +140,6 @@ def test_a_killed_run_leaves_no_display(displays: Displays, number: int) -> None
     program = subprocess.Popen(
         [sys.executable, "-c", SCRIPT], stdout=subprocess.PIPE, start_new_session=True
     )
-    assert program.stdout is not None
     program.stdout.readline()
     family = psutil.Process(program.pid).children(recursive=True)
     assert [p for p in family if p.name() == "Xvfb"]

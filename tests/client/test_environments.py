@@ -194,9 +194,15 @@ def test_caches_are_kept_beside_it_unless_the_user_says_where(
 ABSENT = "no_such_module_here"
 
 
+def home(monkeypatch: pytest.MonkeyPatch, path: str | Path) -> None:
+    """Let another interpreter be the system's."""
+    monkeypatch.setattr(SystemPython, "python", Path(path))
+
+
 @pytest.fixture
-def packaged() -> SimulatorInfo:
-    """A simulator whose engine no interpreter has."""
+def packaged(monkeypatch: pytest.MonkeyPatch) -> SimulatorInfo:
+    """A simulator whose engine no interpreter has; the system's is this one."""
+    home(monkeypatch, sys.executable)
     return replace(
         MuJoCo.info,
         name="packaged",
@@ -207,13 +213,7 @@ def packaged() -> SimulatorInfo:
     )
 
 
-def home(monkeypatch: pytest.MonkeyPatch, path: str | Path) -> None:
-    """Let another interpreter be the system's."""
-    monkeypatch.setattr(SystemPython, "python", Path(path))
-
-
-def test_absent_engine(packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch) -> None:
-    home(monkeypatch, sys.executable)
+def test_absent_engine(packaged: SimulatorInfo) -> None:
     assert missing(packaged) == (
         f"packaged comes with packages of the system, and {sys.executable} has no module {ABSENT}; "
         "on Debian and Ubuntu: apt-get install python3-numpy python3-packaged; or name another: "
@@ -222,11 +222,8 @@ def test_absent_engine(packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch)
     assert interpreter(packaged) is None
 
 
-def test_one_module_of_several_is_enough(
-    packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_module_of_several_is_enough(packaged: SimulatorInfo) -> None:
     """A package that is not there has no modules; asking for one is an error in Python."""
-    home(monkeypatch, sys.executable)
     versions = f"{ABSENT}.eight|{ABSENT}.nine"
     assert SystemPython(replace(packaged, modules=(f"{versions}|json.decoder",))).problem is None
     told = str(missing(replace(packaged, modules=(versions,))))
@@ -237,7 +234,6 @@ def test_engine_in_the_systems_python(
     packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The system's Python finds a module that this process does not find."""
-    home(monkeypatch, sys.executable)
     (tmp_path / f"{ABSENT}.py").write_text("raise SystemExit('a probe imports no engine')\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     packaged = replace(packaged, distribution="numpy")
@@ -252,7 +248,6 @@ def test_engine_in_the_systems_python(
 def test_a_file_in_the_working_folder_is_no_engine(
     packaged: SimulatorInfo, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    home(monkeypatch, sys.executable)
     monkeypatch.delenv("PYTHONPATH", raising=False)
     monkeypatch.chdir(tmp_path)
     Path("another_absent_module.py").touch()

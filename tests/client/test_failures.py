@@ -129,7 +129,6 @@ def test_an_interpreter_that_is_none(
     )
     wrapper.chmod(0o755)
     record = run(replace(case, python=str(wrapper), stall_timeout=3.0))
-    assert record.error is not None
     assert (record.error.type, record.error.phase) == (kind, "launch")
     assert message.format(wrapper=wrapper) in record.error.message
     assert record.error.log_tail == "no such library"
@@ -153,14 +152,12 @@ def test_what_cannot_be_started(
 
 def test_the_log_tail_shows_where_it_crashed(engine: Case) -> None:
     record = run(with_fault(engine, "Crashed"))
-    assert record.error is not None
     assert "Segmentation fault" in record.error.log_tail
     assert "in crash" in record.error.log_tail
 
 
 def test_a_worker_that_eats_memory_is_killed(engine: Case) -> None:
     record = run(with_fault(engine, "Greedy", memory_limit=500.0))
-    assert record.error is not None
     assert record.error.type == "OutOfMemory"
     assert "limit of 500 MB" in record.error.message
     assert record.resources["rss_mb"]["peak"] > 500
@@ -168,7 +165,6 @@ def test_a_worker_that_eats_memory_is_killed(engine: Case) -> None:
 
 def test_a_repetition_times_out(engine: Case) -> None:
     record = run(with_fault(engine, "Hung", timeout=2.0))
-    assert record.error is not None
     assert (record.status, record.error.type) == ("failed", "RepetitionTimeout")
     assert "--sim-timeout" in record.error.message
     # Its own time-out ended it, neither the task's (60 s) nor the limit of silence (20 s).
@@ -189,7 +185,6 @@ def test_crash_while_closing_does_not_fail_a_finished_repetition(engine: Case) -
 def test_no_display(engine: Case) -> None:
     display = {"DISPLAY": ":4711"}  # nobody serves it
     record = run(replace(engine, mode="gui", environment=display))
-    assert record.error is not None
     assert (record.error.type, record.error.phase) == ("WorkerExited", "load")
     assert re.search("display|X server", record.error.log_tail)
 
@@ -197,7 +192,7 @@ def test_no_display(engine: Case) -> None:
 def test_another_world_stops_the_run(engine: Case) -> None:
     kept: list[Record] = []
     case = with_fault(engine, "WrongGravity")
-    repeater = Repeater(Experiment(case, Falling()), LocalExecutor(), Silent(), kept.append)  # type: ignore[arg-type]
+    repeater = Repeater(Experiment(case, Falling()), LocalExecutor(), Silent(), kept.append)
     with pytest.raises(Exception, match=f"gravity: scene .*-9.80665.*{case.simulator} .*-20"):
         repeater.run(range(1, 4))
     assert [record.error.type for record in kept if record.error] == ["WorldParityError"]

@@ -27,10 +27,9 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.experiment.interrupts import Interrupts
 from pytest_simbench.experiment.repeater import Repeater
-from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
-from tests.client.failing import STALL, Silent, failure, faulty
+from tests.client.failing import STALL, Silent, failure, faulty, run
 from tests.conftest import workers
 from tests.tiny import Falling
 
@@ -102,21 +101,20 @@ def test_silence_and_nonsense_end_by_the_stall_limit(
         assert failure(faulty(case, fault), Falling(1e6))[:2] == (kind, phase)
 
 
-def test_a_worker_that_does_not_close(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
-    record, _ = Repetition(Experiment(faulty(case, "StopsClosing"), Falling()), 1).run()
+def test_a_worker_that_does_not_close(case: Case) -> None:
+    record = run(faulty(case, "StopsClosing"))
     assert record.status == "ok"
     assert record.notes.closing == "the worker did not close within 10 s"
 
 
-def test_a_log_does_not_fill_the_disk(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_log_does_not_fill_the_disk(case: Case) -> None:
     assert failure(faulty(case, "FloodsTheLog", stall_timeout=3.0))[0] == "WorkerHung"
     (log,) = (case.folder / "logs").iterdir()
     assert log.stat().st_size < LARGEST
 
 
 def test_a_log_is_cut_though_it_grew_at_once(case: Case) -> None:
-    record, _ = Repetition(Experiment(faulty(case, "FloodsAtOnce"), Falling()), 1).run()
-    assert record.status == "ok"
+    assert run(faulty(case, "FloodsAtOnce")).status == "ok"
     (log,) = (case.folder / "logs").iterdir()
     assert log.stat().st_size < 2 * KEPT
 
@@ -141,7 +139,7 @@ def kept(case: Case, task: Falling, jobs: int = 1, last: int = 1) -> tuple[list[
     try:
         Repeater(Experiment(case, task), LocalExecutor(jobs), Silent(), records.append).run(
             range(1, last + 1)
-        )  # type: ignore[arg-type]
+        )
     except KeyboardInterrupt:
         return records, True
     return records, False
@@ -168,9 +166,8 @@ def test_interrupt(case: Case, fault: str, task: Falling, jobs: int) -> None:
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_interrupt_while_starting(case: Case, tmp_path: object, jobs: int) -> None:
-    folder = case.folder
-    never = folder / "python"
+def test_interrupt_while_starting(case: Case, jobs: int) -> None:
+    never = case.folder / "python"
     never.write_text("#!/bin/sh\nsleep 600\n")
     never.chmod(0o755)
     case = replace(case, python=str(never), stall_timeout=60.0)
@@ -209,7 +206,7 @@ def test_an_interrupt_while_the_record_is_kept(case: Case) -> None:
         records.append(record)
 
     with pytest.raises(KeyboardInterrupt):
-        Repeater(Experiment(case, Falling()), LocalExecutor(1), Silent(), keep).run([1, 2])  # type: ignore[arg-type]
+        Repeater(Experiment(case, Falling()), LocalExecutor(1), Silent(), keep).run([1, 2])
     assert [record.status for record in records] == ["ok"]
 
 
@@ -242,7 +239,7 @@ def test_a_time_out_is_a_failure_also_while_the_run_is_interrupted(case: Case) -
                 repeater._stopping.set()  # Ctrl-C came, and has not reached this worker yet
 
     experiment = Experiment(replace(case, timeout=3.0), Falling(1e6))
-    repeater = Repeater(experiment, LocalExecutor(2), Stopping(), records.append)  # type: ignore[arg-type]
+    repeater = Repeater(experiment, LocalExecutor(2), Stopping(), records.append)
     repeater.run([1])
     assert [(r.status, r.error and r.error.type) for r in records] == [
         ("failed", "RepetitionTimeout")
@@ -288,7 +285,6 @@ class Crowded(Falling):
     """Falls for ever, on a core that is shared with four others once the world is there."""
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        assert world.process.pid is not None
         with core_shared_with(4, world.process.pid), world.phase("fall"):
             world.wait(1e6)
         return Outcome()
@@ -302,11 +298,10 @@ def threads(proc: Path, *stats: str) -> None:
 
 
 def test_a_late_worker_on_a_full_core_says_so(case: Case) -> None:
-    record, _ = Repetition(Experiment(replace(case, timeout=8.0), Crowded()), 1).run()
-    assert record.error is not None
-    assert (record.error.type, record.error.phase) == ("RepetitionTimeout", "fall")
-    assert "waited" in record.error.message
-    assert "--sim-jobs" in record.error.message
+    kind, phase, message = failure(replace(case, timeout=8.0), Crowded())
+    assert (kind, phase) == ("RepetitionTimeout", "fall")
+    assert "waited" in message
+    assert "--sim-jobs" in message
 
 
 def test_all_threads_count(tmp_path: Path) -> None:

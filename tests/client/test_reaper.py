@@ -107,38 +107,13 @@ def test_a_killed_run_leaves_nothing(tmp_path: Path, adapter: str, number: int) 
         assert gone(pids)
 
 
-@pytest.mark.engine
-def test_a_run_that_ends_well_leaves_nothing(tmp_path: Path) -> None:
-    script = SCRIPT.replace("1e6", "0.1")
-    command = [
-        sys.executable,
-        "-c",
-        script,
-        str(tmp_path),
-        "pytest_simbench.sims.mujoco.adapter:MuJoCo",
-    ]
-    program = subprocess.Popen(command)
-    family: set[psutil.Process] = set()
-    while program.poll() is None:
-        try:
-            family.update(psutil.Process(program.pid).children(recursive=True))
-        except psutil.NoSuchProcess:
-            break
-        time.sleep(0.2)
-    assert program.wait() == 0
-    assert family
-    assert gone([process.pid for process in family], 2.0)
-
-
 def test_a_reaper_that_was_ended_is_started_again() -> None:
     reaper.new_mark()
     first = reaper._run and reaper._run._script
-    assert first is not None
     first.kill()
     first.wait()
     reaper.new_mark()
     second = reaper._run and reaper._run._script
-    assert second is not None
     assert second.poll() is None
 
 
@@ -158,8 +133,8 @@ def test_a_reaper_that_was_stopped_ends_with_its_run() -> None:
 
 @pytest.mark.engine
 @pytest.mark.parametrize("killed", [False, True])
-def test_temporary_files_of_workers_go_with_them(tmp_path: Path, killed: bool) -> None:
-    """Whatever an engine leaves there, also when the run is killed."""
+def test_a_run_leaves_no_process_and_no_temporary_file(tmp_path: Path, killed: bool) -> None:
+    """Whatever an engine leaves there: of a run that ends well, and of one that is killed."""
     script = SCRIPT if killed else SCRIPT.replace("1e6", "0.1")
     adapter, told = "tests.client.faulty:LeavesFiles", tmp_path / "ids"
     program = subprocess.Popen([sys.executable, "-c", script, str(tmp_path), adapter])
@@ -167,9 +142,12 @@ def test_temporary_files_of_workers_go_with_them(tmp_path: Path, killed: bool) -
         time.sleep(0.05)
     folder = Path(told.read_text())
     assert folder.parent.name.startswith(reaper.FOLDERS)
+    family = psutil.Process(program.pid).children(recursive=True)
+    assert len(family) >= 2  # worker and reaper
     if killed:
         program.kill()
     assert program.wait() == (-9 if killed else 0)
+    assert gone([process.pid for process in family])
     until = time.monotonic() + 10.0
     while folder.parent.exists() and time.monotonic() < until:
         time.sleep(0.05)

@@ -45,7 +45,6 @@ def start() -> Iterator[Start]:
             start_new_session=True,
         )
         running.append(process)
-        assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         return process
 
@@ -58,7 +57,6 @@ def start() -> Iterator[Start]:
 
 def go(process: subprocess.Popen[str]) -> None:
     """Let a process that waits for a line go on."""
-    assert process.stdin is not None
     process.stdin.write("go\n")
     process.stdin.flush()
 
@@ -87,7 +85,6 @@ def test_cpu_seconds_agree_with_the_processs_own(start: Start) -> None:
     )
     sampler = ResourceSampler(process.pid)
     go(process)
-    assert process.stdout is not None
     assert process.stdout.readline() == "done\n"
     seen = len(sampler._samples)
     until(lambda: len(sampler._samples) > seen + 1)
@@ -148,7 +145,6 @@ def test_the_workers_own_peak_wins_where_it_is_higher(start: Start) -> None:
     with ResourceSampler(start(IDLE).pid, 0.02) as sampler:
         until(lambda: len(sampler._samples) > 1)
     sampled = sampler.stop().peak_mb
-    assert sampled is not None
     assert sampler.stop(peak_mb=sampled + 7).peak_mb == sampled + 7
     assert sampler.stop(peak_mb=1).peak_mb == sampled
 
@@ -222,7 +218,7 @@ class Process:
 
 
 def tree(root: Process) -> _Tree:
-    return _Tree(root)  # type: ignore[arg-type]
+    return _Tree(root)
 
 
 def test_a_tree_is_the_sum_of_all_generations() -> None:
@@ -255,7 +251,7 @@ def test_a_child_that_is_gone_is_left_out_and_the_others_counted() -> None:
     kids = [Process(n, 20.0, 2_000_000) for n in (2, 3, 4)]
     found = tree(Process(1, 10.0, 1_000_000, *kids))
     found.look(0.0)
-    found.members[2].gone = True  # type: ignore[attr-defined]
+    found.members[2].gone = True
     assert found.look(0.1) == (50.0, 5.0)
     assert list(found.members) == [1, 3, 4]
 
@@ -296,7 +292,7 @@ def sampled(monkeypatch: pytest.MonkeyPatch, looks: Sequence[float]) -> list[Res
     clock = Clock(looks)
     monkeypatch.setattr(resources, "time", clock)
     found = sampler()
-    found._tree = clock  # type: ignore[assignment]
+    found._tree = clock
     while clock.looks:
         clock.now = found.due
         found.take(found.look())

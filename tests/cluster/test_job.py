@@ -86,7 +86,6 @@ def test_a_robot_travels_by_content(
     assert robot.urdf.encode() not in data
     monkeypatch.setattr("pytest_simbench.description.robot_files.folder", lambda: tmp_path)
     there = Job.unpack(data).experiment(tmp_path)
-    assert there.robot is not None
     assert Path(there.robot.urdf).parent == tmp_path
     assert Path(there.robot.srdf).parent == tmp_path
     assert describe_robot(there.robot) == describe_robot(robot)

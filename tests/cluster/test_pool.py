@@ -35,7 +35,6 @@ def test_a_machine_offers_what_is_ready_on_it() -> None:
     offers = here(3, ["mujoco"])
     assert set(offers.values()) == {3.0}
     found = Node.of("tcp://here:1", "here", offers)
-    assert found is not None
     assert found.slots == 3
     assert found.versions["mujoco"]
     assert found.has("mujoco", "headless")
@@ -52,7 +51,6 @@ def test_a_release_with_an_environment_of_its_own_is_offered_by_its_name(
     (tmp_path / "mujoco==0.1").mkdir()  # half made
     (tmp_path / "nothing==1.0").mkdir()
     found = Node.of("tcp://here:1", "here", here(1))
-    assert found is not None
     assert found.has(name, "headless")
     assert found.versions["mujoco"] == adapter("mujoco").info.tested_version
     assert [(n, v) for n, v in found.versions.items() if "==" in n] == [(name, "unknown")]

@@ -40,7 +40,6 @@ def test_a_set_is_brought_checked_and_read(source: Local, tmp_path: Path) -> Non
     told: list[str] = []
     download(source, tmp_path / "new" / "data", told.append)
     found = tosses.read(tmp_path / "new" / "data")
-    assert found is not None
     assert [toss.index for toss in found.items] == [0, 1, 10]
     for toss in found.items:
         assert np.allclose(toss.state, falling(10 + toss.index), rtol=0, atol=1e-15)

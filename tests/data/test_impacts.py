@@ -82,7 +82,6 @@ def test_a_file_is_read_and_halves_are_of_even_and_odd_tosses(tmp_path: Path, na
     (tmp_path / name).parent.mkdir(exist_ok=True)
     np.savez(tmp_path / name, **arrays())
     found = impacts.read(tmp_path)
-    assert found is not None
     assert [item.number for item in found.half("all")] == [200, 300]
     assert [item.toss for item in found.half("chosen_on")] == [2]
     assert [item.toss for item in found.half("held_out")] == [3]
@@ -119,7 +118,6 @@ def test_files_of_the_source_are_converted(tmp_path: Path) -> None:
     text = "x,z,th,vx,vz,vth\n" + "\n".join(",".join(map(str, row)) for row in table)
     impacts.convert({f"a b/traj_{k}.csv": text.encode() for k in (10, 9)}, tmp_path)
     found = impacts.read(tmp_path)
-    assert found is not None
     assert [item.number for item in found.items] == [900, 1000]
     assert found.items[0].after == pytest.approx(AFTER, rel=1e-3)
     with pytest.raises(DataError, match=r"a/traj_1.csv holds no toss"):

@@ -50,7 +50,6 @@ def folder(tmp_path: Path) -> Path:
 
 def test_tables_become_what_is_read_and_every_second_pair_is_held_out(folder: Path) -> None:
     found = pushes.read(folder)
-    assert found is not None
     run = found.items[1]
     assert run.name == "CubeExp0002"
     for measured, seed in ((run.hand, 2), (run.cube, 10)):

@@ -25,7 +25,6 @@ def folder(tmp_path: Path) -> Path:
 
 def test_files_are_joined_and_halves_are_of_even_and_odd_numbers(folder: Path) -> None:
     found = tosses.read(folder)
-    assert found is not None
     assert [(toss.index, len(toss.state)) for toss in found.items] == [(0, 20), (1, 5), (3, 30)]
     assert [toss.index for toss in found.half("chosen_on")] == [0]
     assert [toss.index for toss in found.half("held_out")] == [1, 3]

@@ -59,7 +59,6 @@ def read(folder: Path, *changes: tuple[str, str]) -> SceneFile:
 
 def test_joints_have_no_drives_and_the_dynamics_of_the_file(tmp_path: Path) -> None:
     scene = read(tmp_path).scene
-    assert scene.robot is not None
     rail, hinge = scene.robot.joints
     assert (rail.passive_damping, rail.friction) == (4.0, 0.5)
     assert (hinge.passive_damping, hinge.friction) == (0.0, 0.0)
@@ -78,17 +77,14 @@ def test_it_is_moved_up_onto_the_ground(tmp_path: Path) -> None:
     assert read(tmp_path).scene.file_lift == pytest.approx(0.3)
     higher = read(tmp_path, ('xyz="-.3 0 0"', 'xyz="-.3 0 .7"')).scene
     assert higher.file_lift == pytest.approx(0.1)  # of the drawer
-    assert higher.robot is not None
     assert higher.robot.base.position[2] == pytest.approx(0.1)
 
 
 def test_round_shapes_are_hulls_that_touch_them_from_inside(tmp_path: Path) -> None:
     robot = read(tmp_path).scene.robot
-    assert robot is not None
     drawer, door = PreparedRobot(robot).moving_links
     for link, reach, height in ((drawer, 0.1, 0.1), (door, 0.05, 0.05)):
         mesh = link.shapes[0].mesh
-        assert mesh is not None
         corners = read_stl(Path(mesh).read_bytes()).reshape(-1, 3)
         assert np.hypot(*corners.T[:2]).max() == pytest.approx(reach, rel=0.01)
         assert np.abs(corners[:, 2]).max() == pytest.approx(height, rel=0.02)
@@ -133,11 +129,9 @@ def test_nothing_is_dropped_in_silence(tmp_path: Path, old: str, new: str) -> No
 def test_a_joint_that_mimics_is_coupled_and_starts_where_it_belongs(tmp_path: Path) -> None:
     follow = '<mimic joint="hinge" multiplier="2" offset="{}"/><dynamics'
     robot = read(tmp_path, ("<dynamics", follow.format(0.1))).scene.robot
-    assert robot is not None
     assert robot.couplings == (Coupling("rail", "hinge", 2.0, 0.1),)
     assert robot.joints[0].initial_position == 0.1
     found = read(tmp_path, ("<dynamics", follow.format(0.4)))
-    assert found.scene.robot is not None
     assert not found.scene.robot.couplings
     assert found.scene.robot.joints[0].initial_position == 0.3
     states = {line.quantity: line.state for line in found.account}
@@ -146,7 +140,6 @@ def test_a_joint_that_mimics_is_coupled_and_starts_where_it_belongs(tmp_path: Pa
 
 def test_a_range_that_does_not_hold_0_begins_at_its_nearest_end(tmp_path: Path) -> None:
     found = read(tmp_path, ('lower="-.2"', 'lower=".2"'))
-    assert found.scene.robot is not None
     assert found.scene.robot.joints[0].initial_position == 0.2
     assert "joint limit (start)" in {line.quantity for line in found.account}
 

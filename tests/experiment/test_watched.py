@@ -51,8 +51,6 @@ class Helped(MuJoCo):
 
     def step(self) -> None:
         super().step()
-        assert self.helper.stdin is not None
-        assert self.helper.stdout is not None
         self.helper.stdin.write(b"1")
         self.helper.stdout.read(1)
 

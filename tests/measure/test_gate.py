@@ -26,10 +26,12 @@ def run(baseline: Iterable[Record], current: Iterable[Record], text: str) -> Gat
     return run_gate(baseline, current, limits, {"stacking": METRICS})
 
 
-def made(placed: Iterable[float], first_seed: int = 0, **changes: Any) -> list[Record]:
+def made(
+    values: Iterable[float], first_seed: int = 0, metric: str = "placed", **changes: Any
+) -> list[Record]:
     return [
-        record(k, seed=first_seed + k, metrics={"placed": float(v)}, **changes)
-        for k, v in enumerate(placed)
+        record(k, seed=first_seed + k, metrics={metric: float(v)}, **changes)
+        for k, v in enumerate(values)
     ]
 
 
@@ -95,6 +97,7 @@ def test_false_alarms_stay_below_one_in_twenty_even_without_a_margin(
 
 
 MORE = {"rss_mb": {"mean": 180.0, "peak": 200.0}}
+LANDING = {"metric": "landing_error"}
 
 
 @pytest.mark.parametrize(
@@ -109,13 +112,20 @@ MORE = {"rss_mb": {"mean": 180.0, "peak": 200.0}}
          "placed rose from 80 % to 100 % (worse by -20 points"),
         ([1.0] * 10, [1.0] * 10, "ram:10%,ram_peak:50%", {"resources": MORE}, True,
          "ram rose from 150 MB to 180 MB (worse by 20 %, limit 10 %"),
+        ([0.25] * 12, [0.75] * 12, "landing_error:0.25", LANDING, True,
+         "test_stacking[engine-headless]: landing_error rose from 0.25 m to 0.75 m (worse by 0.5 m,"
+         " limit 0.25 m; p = 0.00024, 12 pairs)"),
+        ([0.25] * 12, [0.75] * 12, "landing_error:0.5", LANDING, False, "worse by 0.5 m, limit 0."),
+        ([0.25] * 12, [0.25] * 12, "landing_error:0.01", LANDING, False,
+         "landing_error stayed from 0.25 m to 0.25 m"),
     ],
 )  # fmt: skip
 def test_what_is_worse_by_more_than_its_limit_and_not_by_chance_fails(
     before: list[float], now: list[float], limits: str, given: dict[str, Any], fails: bool,
     said: str,
 ) -> None:  # fmt: skip
-    report = run(made(before), made(now, **given), limits)
+    metric = given.get("metric", "placed")
+    report = run(made(before, metric=metric), made(now, **given), limits)
     sentence = report.changes[0].sentence()
     assert said in sentence
     assert report.failures == (sentence,) * fails
@@ -324,19 +334,6 @@ def test_how_few_are_too_few() -> None:
         for name in ("placed", "ram")
     )
     assert notes(6, 6, two) == ()
-
-
-def test_the_sentence_of_a_metric_in_its_unit() -> None:
-    values = [record(k, metrics={"landing_error": 0.25}) for k in range(12)]
-    worse = [record(k, metrics={"landing_error": 0.75}) for k in range(12)]
-    report = run(values, worse, "landing_error:0.25")
-    assert report.failures == (
-        "test_stacking[engine-headless]: landing_error rose from 0.25 m to 0.75 m (worse by 0.5 m,"
-        " limit 0.25 m; p = 0.00024, 12 pairs)",
-    )
-    assert not run(values, worse, "landing_error:0.5").failures  # not by more than the limit
-    same = run(values, values, "landing_error:0.01").changes[0]
-    assert "landing_error stayed from 0.25 m to 0.25 m" in same.sentence()
 
 
 def test_a_test_that_is_broken_is_told_beside_its_limits() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -25,13 +27,6 @@ HIT = Metric("hit", "hit", kind="yes_no")
 PLACED = Metric("placed", "placed", kind="share", of=15)
 
 
-def test_one_success_shows_two_percent() -> None:
-    """0.025^(1 / n) >= 0.02 at once; the fewest is one."""
-    assert repetitions_for_proportion(1.0, 0.02) == 1
-    assert repetitions_for_proportion(0.0, 0.98) == 1
-    assert repetitions_for_proportion(0.5, 0.5) is None
-
-
 @settings(max_examples=40)
 @given(st.floats(0.0, 1.0), st.floats(0.05, 0.95))
 def test_the_repetitions_for_a_proportion_are_enough(rate: float, threshold: float) -> None:
@@ -50,17 +45,33 @@ def test_more_repetitions_are_needed_nearer_the_threshold(rate: float, gap: floa
     assert near >= far
 
 
-@pytest.mark.parametrize("threshold", [0.05, 0.2, 0.9])
-def test_a_decided_claim_needs_no_more(threshold: float) -> None:
-    assert further_repetitions(Interval(0.5, 0.4, 0.6, 20, "t"), threshold) == 0
+SKEWED, EVEN = Interval(0.5, 0.25, 0.875, 20, "t"), Interval(0.5, 0.4, 0.6, 20, "t")
 
 
-def test_the_width_of_a_mean_shrinks_with_the_root_of_n() -> None:
-    found = Interval(0.5, 0.25, 0.875, 20, "t")
-    assert further_repetitions(found, 0.375) == 60  # the lower arm is twice the gap: 4 n
-    assert further_repetitions(found, 0.625) == 160  # the upper one thrice: 9 n
-    assert further_repetitions(found, 0.5) is None
-    assert further_repetitions(found, 0.5 + 1e-9) is None
+@pytest.mark.parametrize(
+    ("found", "threshold", "more"),
+    [
+        *((EVEN, decided, 0) for decided in (0.05, 0.2, 0.9)),
+        # The width of a mean shrinks with the root of n.
+        (SKEWED, 0.375, 60),  # the lower arm is twice the gap: 4 n
+        (SKEWED, 0.625, 160),  # the upper one thrice: 9 n
+        (replace(EVEN, n=1), 0.45, 3),  # (0.1 / 0.05)^2 - 1
+        (replace(SKEWED, high=0.75, method="betting"), 0.375, 60),
+        *((SKEWED, threshold, None) for threshold in (0.5, 0.5 + 1e-9)),
+        # There is always one more, and never more than the most: 10 000 in all.
+        (EVEN, 0.4, 1),
+        (replace(EVEN, n=100), 0.49, 9900),
+        (replace(EVEN, n=101), 0.49, None),
+        # Where nothing is known yet, the number is not, too.
+        (replace(EVEN, n=0), 0.5, None),
+        *((interval([1.0] * n, COUNT), 0.5, None) for n in (0, 1)),
+        (interval([1.0, 2.0, 3.0], COUNT), 2.0, None),
+    ],
+)
+def test_how_many_more_repetitions_decide(
+    found: Interval, threshold: float, more: int | None
+) -> None:
+    assert further_repetitions(found, threshold) == more
 
 
 def test_further_repetitions_decide_in_simulation() -> None:
@@ -69,7 +80,6 @@ def test_further_repetitions_decide_in_simulation() -> None:
     first = rng.normal(1.0, 1.0, 20)
     first = (first - first.mean()) / first.std(ddof=1) + 1.0
     more = further_repetitions(interval(list(first), COUNT), 0.7)
-    assert more is not None
     n = 20 + more
     lows = [interval(list(sample), COUNT).low for sample in rng.normal(1.0, 1.0, (40, n))]
     assert 0.3 <= np.mean(np.array(lows) >= 0.7) <= 0.75
@@ -94,9 +104,7 @@ def test_shares_without_a_loss_gain_with_their_number() -> None:
     """Their interval is 0.3 m^-n = 40 wide or so: 1 / n, where that of a spread is its root."""
     perfect = interval([1.0] * 20, PLACED)
     more = further_repetitions(perfect, 0.9)
-    assert more is not None
     assert 0.89 < interval([1.0] * (20 + more), PLACED).low < 0.91
-    assert further_repetitions(Interval(0.5, 0.25, 0.75, 20, "betting"), 0.375) == 60
 
 
 @pytest.mark.parametrize(
@@ -151,20 +159,8 @@ def test_further_repetitions_are_counted_at_the_interval_s_own_confidence() -> N
         assert repetitions_for_proportion(1.0, 0.9, confidence) == total
         assert repetitions_for_proportion(0.0, 0.1, confidence) == total
     assert repetitions_for_proportion(1.0, 0.9) == 36
-
-
-def test_nothing_known_needs_an_unknown_number() -> None:
-    assert further_repetitions(Interval(0.5, 0.4, 0.6, 0, "t"), 0.5) is None
-    assert further_repetitions(interval([1.0], COUNT), 0.5) is None
-    assert further_repetitions(interval([], COUNT), 0.5) is None
-    assert further_repetitions(interval([1.0, 2.0, 3.0], COUNT), 2.0) is None
-    assert further_repetitions(Interval(0.5, 0.4, 0.6, 1, "t"), 0.45) == 3  # (0.1 / 0.05)^2 - 1
-
-
-def test_there_is_always_one_more_and_never_more_than_the_most() -> None:
-    assert further_repetitions(Interval(0.5, 0.4, 0.6, 20, "t"), 0.4) == 1
-    assert further_repetitions(Interval(0.5, 0.4, 0.6, 100, "t"), 0.49) == 9900  # 10 000 in all
-    assert further_repetitions(Interval(0.5, 0.4, 0.6, 101, "t"), 0.49) is None
+    for rate, threshold in ((1.0, 0.02), (0.0, 0.98)):  # the fewest is one
+        assert repetitions_for_proportion(rate, threshold) == 1
 
 
 def test_a_detectable_difference_takes_two_repetitions_at_least() -> None:

@@ -153,6 +153,9 @@ def test_what_is_supported_passes_without_a_word(
 @pytest.mark.parametrize(
     ("values", "crashed", "check", "given", "said"),
     [
+        (MIXED, 1, "at_least", ("placed", 0.97),
+         r"^stacking on engine headless \(tuned\): placed is 85\.71 % on average \(95 % bounds "
+         r"62\.9 % and .*, 21 repetitions, 1 crashed and counted as 0 %\), which is below 97 %$"),
         (HALF, 0, "at_most", ("ram_peak", 100), r"ram_peak is 161 MB on average .* above 100 MB"),
         (MIXED, 0, "at_most", ("placed", 0.7), "which is above 70 %"),
         (MIXED, 0, "between", ("placed", 0.97, 1.0), "which is below 97 %"),
@@ -211,32 +214,6 @@ def test_an_unknown_metric_lists_the_valid_ones_and_where_it_is_missing() -> Non
         placed(1.0).assert_at_least("place", 0.5)
     with pytest.raises(UnknownMetric, match="'place'; did you mean"):
         ResultSet([], METRICS).metric("place")
-
-
-def test_at_least_fails_with_one_sentence_that_says_all() -> None:
-    with pytest.raises(AssertionError) as caught:
-        placed(*MIXED, also=1).assert_at_least("placed", 0.97)
-    message = str(caught.value)
-    assert message.startswith(
-        "stacking on engine headless (tuned): placed is 85.71 % on average (95 % bounds 62.9 % and "
-    )
-    assert message.endswith("21 repetitions, 1 crashed and counted as 0 %), which is below 97 %")
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 4])
-@pytest.mark.parametrize("value", [0.0, 1.0])
-def test_fewer_than_five_repetitions_are_not_judged(n: int, value: float) -> None:
-    """One repetition passed any claim above 0, and failed it with one missed throw."""
-    result = placed(*[value] * n)
-    for check in (
-        lambda: result.assert_at_least("placed", 0.5),
-        lambda: result.assert_at_most("placed", 0.5),
-        lambda: result.assert_crashed_at_most(0.1),
-        lambda: result.assert_at_least("rtf", 10),
-        lambda: result.assert_at_least("rtf", 20),
-    ):
-        with pytest.warns(InconclusiveWarning, match="not judged whether at .*a claim needs 5"):
-            check()
 
 
 @pytest.mark.parametrize("name", ["placed", "hit", "landing_error"])
@@ -327,14 +304,10 @@ def test_a_failure_without_a_cause_is_counted_and_told() -> None:
     assert str(caught.value).endswith("crashed: 1 x unknown cause (repetition 20, seed 1020)")
 
 
-@pytest.mark.parametrize("cause", ["RepetitionTimeout", "WorkerHung", "Diverged"])
-def test_every_cause_is_a_failure(cause: str) -> None:
-    result = ResultSet([*records("placed", [1.0] * 3), failed(3, cause)], METRICS)
-    assert [record.seed for record in result.crashed] == [1003]
-    assert result.interval(CRASHED).mean == 0.25
-    with pytest.raises(AssertionError, match=f"1 of 4 repetitions crashed: 1 x {cause} in settle"):
-        result.assert_no_crashes()
-    fine = placed(1.0, 1.0)
+def test_a_claim_of_no_crashes_is_told_whether_it_held_or_not() -> None:
+    crashed, fine = placed(1.0, also=1), placed(1.0, 1.0)
+    with pytest.raises(AssertionError, match="1 of 2 repetitions crashed"):
+        crashed.assert_no_crashes()
     fine.assert_no_crashes()
-    verdicts = [judged.verdict for of in (result, fine) for _, judged in of.judged]
+    verdicts = [judged.verdict for of in (crashed, fine) for _, judged in of.judged]
     assert verdicts == ["refuted", "supported"]  # that it held was not told

@@ -29,7 +29,7 @@ def made(machine: float = 1.0, engine: float = 1.0, **more: float) -> ResultSet:
 
 
 def results(records: object) -> ResultSet:
-    return ResultSet(list(records), METRICS)  # type: ignore[call-overload]
+    return ResultSet(list(records), METRICS)
 
 
 @pytest.mark.parametrize("name", POWER)
@@ -39,7 +39,6 @@ def test_the_machine_is_taken_out_and_the_engine_stays(
 ) -> None:
     before, after = made(), made(machine, engine)
     found = without_speed(name, before, after)
-    assert found is not None
     assert found[0] == pytest.approx(before.by_seed(name))
     changed = engine ** -POWER[name]
     expected = {seed: value * changed for seed, value in before.by_seed(name).items()}
@@ -55,7 +54,6 @@ def test_waiting_for_a_processor_does_not_count(waited: float, control_waited: f
         control_waited=control_waited,
     )
     found = without_speed("rtf", made(), busy)
-    assert found is not None
     assert found[1] == pytest.approx(found[0])
 
 

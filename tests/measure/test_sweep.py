@@ -64,7 +64,7 @@ def test_one_step_is_no_sweep_and_what_is_no_law_neither() -> None:
     assert sweeps([law(0.001, 0.1), law(0.001, 0.2, repetition=2)], METRICS) == []
     plain = [law(h, 0.1, settings={PHENOMENON: None}) for h in STEPS]
     for record in plain:
-        del record.settings[PHENOMENON]  # type: ignore[attr-defined]
+        del record.settings[PHENOMENON]
     assert sweeps(plain, METRICS) == []
 
 
@@ -104,14 +104,11 @@ def test_rounding_of_single_precision_is_no_order() -> None:
 def test_the_cheapest_step_that_keeps_the_law_and_the_cheapest_within_an_error() -> None:
     (line,) = one([law(0.004, 1.0), law(0.002, 0.02), law(0.001, 0.008), law(0.0005, 0.001)]).lines
     kept, within = line.cheapest_kept, line.cheapest_within(0.01)
-    assert kept is not None
-    assert within is not None
     assert (kept.step, within.step) == (0.002, 0.001)
     assert line.cheapest_within(1e-6) is None
     dear = law(0.004, 0.001, stepping={"cpu": 9.0, "simulated": 1.0, "steps": 250})
     (line,) = one([dear, law(0.002, 0.001)]).lines  # the cheapest is not the longest step
     kept = line.cheapest_kept
-    assert kept is not None
     assert kept.step == 0.002
 
 
@@ -127,7 +124,6 @@ def test_the_step_to_take_keeps_most_laws_as_well_as_a_millisecond_may() -> None
     fall = [law(h, 6 * h) for h in STEPS]  # within 0.01 up to 1 ms
     spin = [law(h, 3 * h, name="spin") for h in STEPS]  # up to 2 ms
     found = choice(sweeps([*fall, *spin], METRICS), MUJOCO)
-    assert found is not None
     assert (found.step, found.kept, found.laws, found.cost) == (0.001, 2, 2, pytest.approx(1.0))
     assert choice(sweeps(fall, METRICS), ("ode", "headless", "tuned", 1)) is None
 

@@ -31,7 +31,7 @@ def between(low: float, high: float) -> Interval:
     ],
 )
 def test_a_claim_is_decided_by_the_whole_interval(claim: object, verdict: Verdict) -> None:
-    assert judge(claim, between(0.8, 0.9)).verdict is verdict  # type: ignore[arg-type]
+    assert judge(claim, between(0.8, 0.9)).verdict is verdict
 
 
 @given(st.floats(-1, 2), st.floats(0, 1), st.floats(0, 1))

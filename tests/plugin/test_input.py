@@ -214,20 +214,3 @@ def test_bad_marks_are_told_all_at_once(pytester: pytest.Pytester) -> None:
     for number, (_, message) in enumerate(BAD_MARKS):
         (told,) = (line for line in lines if f"::test_{number}: " in line)
         assert all(part in told for part in message.split("*")), told
-
-
-def test_unreadable_robot_description(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        """
-        from dataclasses import replace
-        from pytest_simbench.motion.panda import panda
-        from pytest_simbench.scene import Scene
-
-        def test_it(sim):
-            sim(Scene("s", (), replace(panda(), urdf="/nowhere/panda.urdf")))
-        """
-    )
-    result = run_pytest(pytester, "--sim=mujoco", failed=1)
-    result.stdout.fnmatch_lines(
-        ["*cannot read the robot description /nowhere/panda.urdf: No such file or directory*"]
-    )

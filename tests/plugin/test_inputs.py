@@ -169,16 +169,6 @@ def test_what_hangs_on_a_joint_settles_too(pytester: pytest.Pytester, blocks: Pa
         assert record["metrics"]["restless"] is None
 
 
-@pytest.mark.engine
-def test_a_joint_that_no_scene_holds_is_refused_by_name(
-    pytester: pytest.Pytester, blocks: Path
-) -> None:
-    blocks.write_text(SCENE.replace("<freejoint/>", '<joint name="shoulder" type="ball"/>', 1))
-    found = pytester.runpytest("--sim-scene", str(blocks), "--sim", "mujoco")
-    assert found.ret == pytest.ExitCode.USAGE_ERROR
-    found.stderr.fnmatch_lines(["ERROR: --sim-scene:*shoulder*"])
-
-
 def test_without_a_file_the_test_is_skipped_and_says_so(pytester: pytest.Pytester) -> None:
     pytester.makepyfile("def test_it(sim_case, scene_file): scene_file()")
     found = pytester.runpytest("--sim", "mujoco", "-rs")

@@ -16,7 +16,6 @@ def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str)
     monkeypatch.setattr(main, "main", lambda words: given.append(words) or 0)
     config = pytester.parseconfig(*words)
     command = old_options.asked(config)
-    assert command is not None
     assert old_options.run_command(config, command) == 0
     return given[0]
 

@@ -50,6 +50,8 @@ def test_the_command_that_runs_a_failed_one_again_names_its_file(
     result = run_pytest(
         pytester, "--sim=mujoco --reps=1 --policies=mine.py:nothing,mine.py:still", failed=2
     )
+    for name in ("nothing", "still"):
+        result.stdout.fnmatch_lines([f"FAILED *test_reaching[[]mujoco-headless-{name}[]]*"])
     again = next(line for line in result.outlines if "again: pytest" in line)
     assert "--sim-policies=mine.py:nothing,mine.py:still" in again
     words = shlex.split(again.partition("again: pytest ")[2])
@@ -57,7 +59,8 @@ def test_the_command_that_runs_a_failed_one_again_names_its_file(
 
 
 def test_a_test_is_made_for_each_policy_of_its_task(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(mine=MINE, test_it=TESTS)
+    mine = MINE.replace("import numpy as np", "import beside")  # a module in the same folder
+    pytester.makepyfile(mine=mine, beside="", test_it=TESTS)
     pytester.makepyfile(one="def policy(seen):\n    return None\n")
     run_pytest(
         pytester,
@@ -104,12 +107,3 @@ def test_what_is_no_policy(pytester: pytest.Pytester, spec: str, sentence: str) 
     )  # fmt: skip
     pytester.makefile(".txt", text="policy = 3")
     assert fnmatchcase(refusal(pytester, f"--policies={spec}"), sentence)
-
-
-def test_one_of_several_by_its_name_and_a_module_beside_it(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        mine=MINE.replace("import numpy as np", "import beside"), beside="", test_it=TESTS
-    )
-    for name in ("nothing", "still"):
-        result = pytester.runpytest("--sim=mujoco", "--collect-only", f"--policies=mine.py:{name}")
-        result.stdout.fnmatch_lines([f"*test_reaching[[]mujoco-headless-{name}[]]*"])

@@ -12,17 +12,10 @@ from rosbags.highlevel import AnyReader
 from pytest_simbench.cli.runs import recordings
 from pytest_simbench.recordings.trace import Trace
 from tests.cli.command import simbench
-from tests.plugin.inner import run_pytest
+from tests.plugin.inner import FALLING, run_pytest
 from tests.report.samples import record
 
-TEST = """
-    import pytest
-    from tests.tiny import Falling
-
-    @pytest.mark.reps(2)
-    def test_falling(repeat):
-        repeat(Falling())
-"""
+TWICE = "--reps=2 --sim-output=o"
 
 
 def heights(folder: Path) -> np.ndarray:
@@ -39,8 +32,8 @@ def heights(folder: Path) -> np.ndarray:
 
 @pytest.mark.parametrize("more", [[], ["-n2"]], ids=["plain", "xdist"])
 def test_each_repetition_gets_a_bag(pytester: pytest.Pytester, more: list[str]) -> None:
-    pytester.makepyfile(TEST)
-    result = run_pytest(pytester, "--sim=mujoco --sim-output=o --sim-record=mcap", *more, passed=1)
+    pytester.makepyfile(FALLING)
+    result = run_pytest(pytester, f"{TWICE} --sim=mujoco --sim-record=mcap", *more, passed=1)
     result.stdout.fnmatch_lines(
         [
             "recordings  repetition 2 of 2  ok after *",
@@ -60,8 +53,8 @@ def test_each_repetition_gets_a_bag(pytester: pytest.Pytester, more: list[str]) 
 
 
 def test_a_kept_run_is_recorded_later(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(TEST)
-    run_pytest(pytester, "--sim=mujoco --sim-output=o --sim-trace=on")
+    pytester.makepyfile(FALLING)
+    run_pytest(pytester, f"{TWICE} --sim=mujoco --sim-trace=on")
     assert not (pytester.path / "o" / "recordings").exists()
     result = simbench(pytester, "report", "o", "--record=mcap")
     assert result.ret == 0
@@ -82,10 +75,9 @@ def test_a_run_without_traces_says_so(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("drawn")
 def test_pictures_and_videos_are_taken_beside_what_is_measured(pytester: pytest.Pytester) -> None:
-    pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
-    pytester.makepyfile(TEST + TEST.replace("def test_falling", "def test_again"))
+    pytester.makepyfile(FALLING + FALLING.replace("def test_falling", "def test_again"))
     result = run_pytest(
-        pytester, "--sim=mujoco,dart --sim-output=o --sim-pictures --sim-video=first", passed=4
+        pytester, f"{TWICE} --sim=mujoco,dart --sim-pictures --sim-video=first", passed=4
     )
     told = "dart has no renderer of its own: no pictures and no videos"
     assert result.stdout.str().count(told) == 1

@@ -9,6 +9,8 @@ import pytest
 from tests.cli.command import simbench
 from tests.plugin.inner import distribution, importable, run_pytest
 
+pytestmark = pytest.mark.usefixtures("drawn")
+
 TEST = """
     from pytest_simbench.tasks import Moment
     from pytest_simbench.tasks import LeaningTowers
@@ -27,14 +29,6 @@ TEST = """
         towers.search({"x": 0.012}, shrinks=10, at_once=1).assert_found()
         towers.sensitivity("cube_01").assert_below(10.0, until=1.0)
 """
-
-
-@pytest.fixture(autouse=True)
-def tasks_here(
-    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch, drawn: None
-) -> None:
-    """The inner pytest can import these tests' tasks, which draws in matplotlib, too."""
-    monkeypatch.setenv("PYTHONPATH", str(request.config.rootpath))
 
 
 @pytest.mark.parametrize("workers", [(), ("-n2",)], ids=["one process", "xdist"])

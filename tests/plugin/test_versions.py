@@ -1,4 +1,5 @@
-"""Several versions of one simulator in one run: names, marks, settings, ids, records."""
+"""Several versions of one simulator: names, marks, settings, ids and records of a run. A regression
+planted in one release: seen in the history, found by the bisection, stopped by the gate."""
 
 from __future__ import annotations
 
@@ -10,7 +11,9 @@ import pytest
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.plugin.selection import select
 from pytest_simbench.simulator.registry import adapter
-from tests.plugin.inner import records, run_pytest, wrapper
+from tests.cli.command import simbench
+from tests.plugin.inner import records, run_pytest, usage_error, wrapper
+from tests.plugin.planted import plant
 
 
 @pytest.fixture
@@ -70,3 +73,78 @@ def test_a_build_without_a_label_is_called_by_its_version(
     name = release.replace("==", "@")
     assert selection.simulators == (name,)
     assert selection.pythons == {name: str(python)}
+
+
+@pytest.fixture
+def planted(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    plant(pytester, monkeypatch)
+
+
+@pytest.mark.usefixtures("planted", "drawn")
+def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
+    result = run_pytest(pytester, "--sim-history=planted:4 --reps=5", passed=4)
+    result.stdout.fnmatch_lines(
+        ["planted, falling (headless tuned), 4 releases, 1.2 to 1.5:",
+         "  landed fell with 1.3: 100 % -> 0 %, p = *"]
+    )  # fmt: skip
+    (folder,) = (pytester.path / ".simbench" / "history").iterdir()
+    assert len(records(folder)) == 20
+    assert list(folder.glob("planted_falling_history*.png"))
+
+    result = simbench(  # what the history has recorded is not run again
+        pytester, "bisect", "planted:1.2..1.5", "landed", "--reps=5", "test_planted.py"
+    )
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(
+        ["bisecting 4 releases of planted: 2 steps, and the ends",
+         "1.3 landed 0 %: worse",
+         "the first worse release is 1.3: 1.2 landed 100 %, 1.3 landed 0 % (p = 0.03*)",
+         f"results: {folder}"]
+    )  # fmt: skip
+    assert len(records(folder)) == 20
+
+    result = run_pytest(
+        pytester,
+        "--sim=planted==1.2,planted==1.3 --sim-baseline=planted==1.2 --reps=5",
+        *("--sim-compare-fail=landed:5%", f"--sim-resume={folder}"),
+        ret=1,
+        passed=2,
+    )
+    result.stdout.fnmatch_lines(
+        ["baseline: planted==1.2 in this run",
+         '  versions.planted-engine was "1.2", is "1.3"',
+         "FAILED *[[]planted==1.3-headless[]]: landed fell from 100 % to 0 %"]
+    )  # fmt: skip
+
+
+@pytest.mark.usefixtures("planted")
+def test_a_worker_with_another_release_than_its_name_says(pytester: pytest.Pytester) -> None:
+    other = pytester.path / "environments" / "planted==1.4" / "bin" / "python"
+    result = run_pytest(
+        pytester, f"--sim=planted==1.2 --sim-spec=planted==1.2=popen//python={other} --reps=1"
+    )
+    result.stdout.fnmatch_lines(["CRASHED falling, planted==1.2 *: 1 x WorkerStartError in *"])
+    (record,) = pytester.path.glob(".simbench/*/records.jsonl")
+    assert json.loads(record.read_text())["error"]["message"] == (
+        "planted==1.2 was asked for, and the worker's interpreter has planted-engine 1.4; name one "
+        "that has 1.2, or write planted@PYTHON to call it by what it has"
+    )
+
+
+@pytest.mark.usefixtures("planted")
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["--sim-bisect", "planted:1.0..1.9", "landed"],
+            "simbench bisect: the package index has no planted-engine 1.9 for Python *",
+        ),
+        (["--sim=planted==1.2", "--sim-baseline=planted==1.2"], "*no other version of planted*"),
+        (["--sim-history=ode:3"], "--sim-history: ode comes with packages of the system*"),
+    ],
+)
+def test_wrong_input_is_one_sentence(
+    pytester: pytest.Pytester, arguments: list[str], message: str
+) -> None:
+    result = run_pytest(pytester, "", *arguments)
+    usage_error(result, f"ERROR: *{message}")

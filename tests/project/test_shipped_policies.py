@@ -24,7 +24,6 @@ def commands(policy: Any, task: GoalTask, seed: int) -> FloatArray:
     """Where a policy sends the tool, which gets there at once, in a world where nothing moves."""
     scene = task.scene(10_001, Jitter())
     servo, robot = Servo(scene), scene.robot
-    assert robot is not None
     position = robot.column("initial_position")
     bodies = np.array([np.r_[b.pose.as_array(), np.zeros(6)] for b in scene.free_bodies])
     names = tuple(body.name for body in scene.free_bodies)

@@ -40,7 +40,6 @@ def messages_of_mcap(folder: Path) -> dict[str, list[tuple[int, Any]]]:
     found: dict[str, list[tuple[int, Any]]] = {}
     with path.open("rb") as file:
         for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
-            assert schema is not None
             read = STORE.deserialize_cdr(message.data, schema.name)
             found.setdefault(channel.topic, []).append((message.log_time, read))
     return found
@@ -132,7 +131,6 @@ def test_every_shape_has_a_marker_in_a_frame_that_there_is(tmp_path: Path) -> No
     assert {marker.header.frame_id for marker in markers} <= frames
     assert len({(marker.ns, marker.id) for marker in markers}) == len(markers)
     triangles = [m for m in markers if m.type == m.TRIANGLE_LIST and m.ns == "robot"]
-    assert kept.figure is not None
     assert sum(len(m.points) for m in triangles) == 3 * sum(
         len(m.faces) for m in kept.figure.meshes
     )
@@ -159,7 +157,6 @@ def named(hostile: Sequence[str]) -> Trace:
     """A stranger's trace: each name of the robot's is one of these texts, its description is all of
     them. A body refuses such names."""
     kept = trace(phases=[(0.01 * k, text) for k, text in enumerate(hostile)])
-    assert kept.figure is not None
     text = itertools.cycle(hostile)
     links = {name: f"{name} {next(text)}" for name in kept.figure.links}
     joints = {name: f"{name} {next(text)}" for name in kept.joint_names}

@@ -41,14 +41,12 @@ def test_it_names_no_path_of_this_machine(tmp_path: Path) -> None:
     trace().write(tmp_path, "x.npz")
     about = np.load(tmp_path / "x.npz")["about"].tobytes().decode()
     robot = scene().robot
-    assert robot is not None
     assert str(Path(robot.urdf).parent) not in about
     assert ".stl" not in about
 
 
 def test_meshes_are_the_files_triangles() -> None:
     figure = trace().figure
-    assert figure is not None
     assert [len(mesh.faces) for mesh in figure.meshes] == [200, *[300] * 5, 200, 200, 200]
     assert max(float(abs(mesh.vertices).max()) for mesh in figure.meshes) < 0.5  # metres
 
@@ -90,7 +88,6 @@ def test_what_is_no_trace_is_refused(changes: Any, message: str, tmp_path: Path)
 
 def test_links_that_hang_on_each_other_are_refused(tmp_path: Path) -> None:
     figure = trace().figure
-    assert figure is not None
     wire = figure.to_wire()
     wire["hinges"][0]["parent"] = wire["hinges"][0]["child"]
     spoilt(tmp_path / "x.npz", about=about(tmp_path / "y.npz", figure=wire))

@@ -33,7 +33,6 @@ time.sleep(600)
     process = subprocess.Popen(
         [sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, text=True
     )
-    assert process.stdout is not None
     assert process.stdout.readline() == "mine\n"
     with pytest.raises(FolderError, match="another run is under way"):
         FolderLock(tmp_path)

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
+from matplotlib.image import imread
 
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.recordings.film import Album
@@ -29,7 +31,6 @@ from tests.measure.test_law_history import asked, row
 from .model.test_laws import SWEPT, law, swept
 from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run
 
-matplotlib = pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
 COLOURS = {"red": (255, 0, 0), "green": (0, 255, 0), "blue": (0, 0, 255)}
 WHITE = (255, 255, 255)
 
@@ -104,8 +105,6 @@ def test_a_fault_of_the_drawing_costs_the_pictures_alone(
 
 
 def test_one_picture_for_all_laws_over_releases_and_its_colours(tmp_path: Path) -> None:
-    from matplotlib.colors import to_hex
-
     records = [
         *row("fall", 0.2, 0.2, 0.2, 0.2, phenomenon="free motion"),
         *row("tower", 0.1, 0.1, None, 0.1),
@@ -113,7 +112,7 @@ def test_one_picture_for_all_laws_over_releases_and_its_colours(tmp_path: Path) 
     ]
     (laws,) = found = Report.of(RunContents(records=tuple(records))).histories
     with drawing():
-        (axis,) = draw_laws(laws).axes  # type: ignore[arg-type]
+        (axis,) = draw_laws(laws).axes
         cells = [[to_hex(cell) for cell in line] for line in axis.images[0].get_array()]
     kept = cells[0][0]
     assert cells[0] == [kept] * 4
@@ -132,7 +131,7 @@ def test_each_phenomenon_over_time_steps_has_two_pictures(
     tmp_path: Path, error: float | str | None
 ) -> None:
     """Also of one simulator that is exact, or fails, at every step: the law has its panel."""
-    alone = [law("a", "fall", error, step=h) for h in (1e-3, 2e-3)] if error != "some" else SWEPT  # type: ignore[arg-type]
+    alone = [law("a", "fall", error, step=h) for h in (1e-3, 2e-3)] if error != "some" else SWEPT
     paths = write(tmp_path, sweep.pictures(swept(alone)))
     assert [p.name for p in paths] == ["sweep_free_motion_step.png", "sweep_free_motion_cost.png"]
     assert all(path.stat().st_size > 1000 for path in paths)
@@ -149,10 +148,7 @@ def keep(run: Path, made: Record, **phases: str) -> Record:
 
 
 def seen(sheet: bytes) -> np.ndarray:
-    from matplotlib.image import imread
-
-    picture: np.ndarray = (imread(io.BytesIO(sheet), format="png")[:, :, :3] * 255).astype(int)
-    return picture
+    return (imread(io.BytesIO(sheet), format="png")[:, :, :3] * 255).astype(int)
 
 
 def test_pictures_stand_by_simulator_and_by_the_time_of_what_they_show(tmp_path: Path) -> None:
@@ -202,7 +198,6 @@ def test_hostile_names_do_no_harm_and_what_cannot_be_read_is_told(tmp_path: Path
 
 @pytest.mark.parametrize("least", [0.0, 3e-4])
 def test_the_front_of_a_search_has_plain_numbers_at_its_axes(least: float) -> None:
-    pytest.importorskip("matplotlib")
     points = [(0.0114, 0.019), (0.0139, 4e-4), (0.0204, least), (0.03, 0.09)]
     with drawing():
         figure = front.draw(points, points[:3], (0.018, 0.0128), "cpu_cost", "m")

@@ -33,7 +33,7 @@ class Planting:
         cls.profiles = {name: _with_fault(settings) for name, settings in cls.profiles.items()}
 
     def load(self, scene: Scene) -> None:
-        super().load(scene)  # type: ignore[misc]
+        super().load(scene)
         for quantity in filter(None, self.settings.fault.split(";")):
             self.faults[quantity](self)
 
@@ -41,5 +41,4 @@ class Planting:
 def _with_fault(settings: Settings) -> Settings:
     values = {f.name: getattr(settings, f.name) for f in fields(settings)}
     kind = make_dataclass("Faulty", [("fault", str, "")], bases=(type(settings),), frozen=True)
-    found: Settings = kind(**values)
-    return found
+    return kind(**values)

@@ -280,8 +280,7 @@ STAGE = {
 
 
 def tell(s: Any) -> Told:
-    told: Told = globals()[f"told_{s.info.name}"](s)
-    return told
+    return globals()[f"told_{s.info.name}"](s)
 
 
 def in_numbers(s: Any) -> Told:

@@ -22,8 +22,6 @@ from pytest_simbench.testing import scenes
 
 from .worlds import loaded, stepped
 
-pytest.importorskip("dartpy")
-
 
 def world(scene: Scene, **changes: Any) -> DART:
     return loaded(DART, scene, **changes)

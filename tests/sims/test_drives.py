@@ -70,7 +70,6 @@ def test_both_fingers_press_with_the_squeeze(name: str, fine: dict[str, Any], bo
     so that its tendon is seen and not the solver's residual (24.6 N at tuned)."""
     scene = replace(scenes.grip(), gravity=(0.0, 0.0, 0.0))
     robot = scene.robot
-    assert robot is not None
     goal = robot.column("initial_position")
     goal[robot.finger_indices] = robot.gripper.closed
     simulator = loaded(adapter(name), scene, **fine)

@@ -9,8 +9,7 @@ holds the two lists together against all that the adapter reads back.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -55,10 +54,6 @@ class Engine:
     scene: Scene = field(default_factory=true_scene)
     profile: str = "tuned"
     fixed: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def faults(self) -> Collection[str]:
-        return self.cls.faults
 
 
 MEAN = Scene(
@@ -112,22 +107,9 @@ HONEST = [
 ]
 
 
-@pytest.fixture(scope="module")
-def kept() -> Iterator[dict[str, Worlds]]:
-    """One worker for each engine, whatever the order of the tests."""
-    with ExitStack() as stack:
-        kept: dict[str, Worlds] = {}
-        yield kept
-        for worlds in kept.values():
-            stack.enter_context(worlds)
-
-
 @pytest.fixture
-def worlds(request: pytest.FixtureRequest, kept: dict[str, Worlds]) -> Worlds:
-    name = request.param
-    if name not in kept:
-        kept[name] = Worlds(ENGINES[name].cls)
-    return kept[name]
+def worlds(request: pytest.FixtureRequest, worlds_of: Callable[[type[Planting]], Worlds]) -> Worlds:
+    return worlds_of(ENGINES[request.param].cls)
 
 
 @pytest.mark.parametrize(("worlds", "profile"), HONEST, indirect=["worlds"])
@@ -138,7 +120,8 @@ def test_an_honest_world_passes(worlds: Worlds, task: Any, profile: str) -> None
 
 def rounds(engine: Engine) -> list[str]:
     """The faults of each world: one, or all of an engine whose worlds are dear to build."""
-    return [";".join(engine.faults)] if engine.cls.info.costly_start else [*engine.faults]
+    faults = engine.cls.faults
+    return [";".join(faults)] if engine.cls.info.costly_start else [*faults]
 
 
 @pytest.mark.parametrize(
@@ -192,4 +175,4 @@ def test_nothing_is_left_out(worlds: Worlds) -> None:
     """An honest world, and all that is read back of it is in one of the lists."""
     engine = ENGINES[worlds.cls.info.name]
     reported = worlds.load(engine.scene, engine.profile).process.request("read_back")
-    assert uncovered(reported, engine.faults, engine.fixed) == set()
+    assert uncovered(reported, engine.cls.faults, engine.fixed) == set()

@@ -120,23 +120,19 @@ def test_the_release_is_read_off_the_librarys_file() -> None:
 
 def test_the_world_is_that_of_the_engine(tmp_path: Path) -> None:
     """Joints are 0 where the scene has them start; a name is a body's or the robot's."""
-    assert SCENE.robot is not None
     scene = replace(SCENE, bodies=(replace(CUBE, name="robot", pose=Pose.at(1.0, 1.0, 0.025)),))
     prepared = PreparedRobot(SCENE.robot)
     for engine, elements in (("dartsim", "ode/mu"), ("bullet-featherstone", "bullet/friction")):
         physics = Physics(GazeboSettings(engine=engine, torsional_friction=0.25))
         world = ET.fromstring(world_text(scene, prepared, physics, "w", tmp_path)).find("world")
-        assert world is not None
         assert world.findtext("plugin/engine/filename") == f"gz-physics-{engine}-plugin"
         assert world.find(f"model/link/collision/surface/friction/{elements}") is not None
         twist = world.findtext("model/link/collision/surface/friction/torsional/coefficient")
         assert twist == {"dartsim": None, "bullet-featherstone": "0.25"}[engine]
         model = world.find(f"model[@name='{robot_model(scene)}']")
-        assert model is not None
         assert len(world.findall("model[@name='robot']")) == 1
         for joint in SCENE.robot.joints:
             limit = model.find(f"joint[@name='{joint.name}']/axis/limit")
-            assert limit is not None
             found = [float(limit.findtext(what, "")) for what in ("lower", "upper")]
             expected = prepared.limits[joint.name] - joint.initial_position
             np.testing.assert_allclose(found, expected)
@@ -253,14 +249,12 @@ def test_a_window_that_cannot_be_opened(record: Path, monkeypatch: pytest.Monkey
 
 def test_what_is_drawn_is_what_collides(tmp_path: Path) -> None:
     """In the scene's colours, and only where there is a window."""
-    assert SCENE.robot is not None
     prepared = PreparedRobot(SCENE.robot)
     physics = Physics(GazeboSettings())
     plain = ET.fromstring(world_text(SCENE, prepared, physics, "w", tmp_path))
     world = ET.fromstring(world_text(SCENE, prepared, physics, "w", tmp_path, drawn=True)).find(
         "world"
     )
-    assert world is not None
     assert plain.find("world/model/link/visual") is None
     assert plain.find("world/plugin[2]") is None
     names = [plugin.get("name", "") for plugin in world.findall("plugin")]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -41,9 +41,8 @@ EGG = """<robot name="egg">
 
 
 @pytest.fixture(scope="module")
-def worlds() -> Iterator[Worlds]:
-    with Worlds(Genesis) as worlds:
-        yield worlds
+def worlds(worlds_of: Callable[[type[Genesis]], Worlds]) -> Worlds:
+    return worlds_of(Genesis)
 
 
 def test_the_worker_survives_a_bad_option(worlds: Worlds) -> None:

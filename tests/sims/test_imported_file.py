@@ -3,7 +3,7 @@ keep."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -27,15 +27,13 @@ STEP = 1e-3
 
 
 @pytest.fixture(scope="module")
-def worlds() -> Iterator[Worlds]:
-    with Worlds(Newton) as worlds:
-        yield worlds
+def worlds(worlds_of: Callable[[type[Newton]], Worlds]) -> Worlds:
+    return worlds_of(Newton)
 
 
 @pytest.fixture(scope="module")
-def genesis() -> Iterator[Worlds]:
-    with Worlds(Genesis) as worlds:
-        yield worlds
+def genesis(worlds_of: Callable[[type[Genesis]], Worlds]) -> Worlds:
+    return worlds_of(Genesis)
 
 
 def scene_of(path: Path, text: str) -> Scene:

@@ -92,7 +92,6 @@ def test_rotors_and_damping_of_actuators_are_those_of_the_joint(kitchen: Path) -
 
 def accelerations(reading: Reading, seed: int) -> dict[str, list[float]]:
     """Of all joints, in the file's model and in the scene's, without contacts."""
-    assert reading.scene.robot is not None
     names = reading.scene.robot.joint_names
     simulator = loaded(MuJoCo, reading.scene, "default")
     rng = np.random.default_rng(seed)
@@ -141,7 +140,6 @@ def test_a_link_of_parts_feels_their_mean_share_of_gravity(kitchen: Path) -> Non
 
 def test_limits_drives_and_the_rest_of_the_scene(kitchen: Path) -> None:
     scene = Reading(str(kitchen)).scene
-    assert scene.robot is not None
     limits = PreparedRobot(scene.robot).limits
     assert limits["slide"] == pytest.approx([0, 0.25])
     assert limits["shoulder"] == pytest.approx(np.radians([-90, 120]))
@@ -192,7 +190,6 @@ def test_constraints_move_links_as_in_the_file(
 ) -> None:
     """A tenth of a second in steps of 0.1 ms, as hard in the file as in the scene."""
     reading = changed(kitchen, "</worldbody>", EQUALITY.format(held))
-    assert reading.scene.robot is not None
     assert len(reading.scene.robot.closures) == closures
     assert len(reading.scene.robot.couplings) == couplings
     found = {}
@@ -222,7 +219,6 @@ def moved(scene: Scene, profile: str) -> MuJoCo:
 )
 def test_constraints_that_are_not_carried_say_why(kitchen: Path, held: str, why: str) -> None:
     reading = changed(kitchen, "</worldbody>", EQUALITY.format(held))
-    assert reading.scene.robot is not None
     assert not reading.scene.robot.closures + reading.scene.robot.couplings
     told = {line.quantity: line.reason for line in reading.account if line.state == "not carried"}
     (reason,) = (text for name, text in told.items() if name.startswith("equality"))
@@ -354,7 +350,6 @@ def test_a_body_on_several_joints_moves_as_in_the_file(kitchen: Path) -> None:
 
 def test_a_start_outside_of_the_range_is_its_nearest_end(kitchen: Path) -> None:
     reading = changed(kitchen, 'range="0 .25"', 'range=".1 .25"')
-    assert reading.scene.robot is not None
     assert reading.scene.robot.joints[0].initial_position == pytest.approx(0.1)
     assert "joint range (start)" in {line.quantity for line in reading.account}
 

@@ -3,9 +3,8 @@ drives of the kind `velocity` do what Webots' motors do."""
 
 from __future__ import annotations
 
-import json
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,18 +19,20 @@ from pytest_simbench.sims.ode.contacts import APART, _slip, distinct
 from pytest_simbench.client.environments import interpreter
 from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.world import World
+from pytest_simbench.experiment.case import Case
 from pytest_simbench.laws.mechanisms import Part, Y, mechanism
 from pytest_simbench.scene import ConvexMesh, Coupling, FloatArray, Pose, Robot, Scene, Trajectory
 from pytest_simbench.testing import scenes
+from tests.conftest import case_of, performed
+from tests.tiny import Falling
 
 from .ode_faults import Mortal, RawTip, Tip
 from .worlds import Worlds
 
 
 @pytest.fixture(scope="module")
-def worlds() -> Iterator[Worlds]:
-    with Worlds(ODE) as worlds:
-        yield worlds
+def worlds(worlds_of: Callable[[type[ODE]], Worlds]) -> Worlds:
+    return worlds_of(ODE)
 
 
 def to(world: World, goal: FloatArray, seconds: float = 1.0) -> None:
@@ -46,25 +47,14 @@ def to(world: World, goal: FloatArray, seconds: float = 1.0) -> None:
 
 def test_the_worker_runs_in_the_systems_python(worlds: Worlds) -> None:
     python = interpreter(ODE.info)
-    assert python is not None
     version = subprocess.check_output([python, "-c", "import sys; print(*sys.version_info[:3])"])
     assert worlds.worker.python_version == ".".join(version.decode().split())
 
 
-def test_a_record_has_the_versions_of_both_libraries(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        """
-from tests.tiny import Falling
-
-def test_falling(repeat):
-    repeat(Falling())
-"""
-    )
-    result = pytester.runpytest_subprocess("--sim=ode", "--reps=1", "--sim-output=out")
-    assert result.ret == 0, result.stdout.str()
-    record = json.loads((pytester.path / "out" / "records.jsonl").read_text().splitlines()[0])
-    assert record["versions"]["Py3ODE"] == ODE.info.tested_version
-    assert record["versions"]["libode"][0].isdigit()
+def test_a_record_has_the_versions_of_both_libraries(case: Case) -> None:
+    versions = performed(case_of(case, "ode"), Falling()).versions
+    assert versions["Py3ODE"] == ODE.info.tested_version
+    assert versions["libode"][0].isdigit()
 
 
 def turning_on(robot: Robot, folder: Path) -> Robot:

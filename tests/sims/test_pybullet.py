@@ -36,6 +36,7 @@ def test_motors_follow_the_drive_law(way: float) -> None:
 def test_default_is_what_the_engine_does_by_itself() -> None:
     """Tumbling boxes end bit for bit where an engine leaves them whose parameters nobody set."""
     import pybullet
+    from pybullet_utils.bullet_client import BulletClient
 
     boxes = [
         Box(
@@ -51,30 +52,20 @@ def test_default_is_what_the_engine_does_by_itself() -> None:
     ours = simulator.body_state()
     simulator.close()
 
-    client = pybullet.connect(pybullet.DIRECT)
-    pybullet.setGravity(*scene.gravity, physicsClientId=client)
-    plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-    bodies = [pybullet.createMultiBody(0, plane, physicsClientId=client)]
+    engine = BulletClient(pybullet.DIRECT)
+    engine.setGravity(*scene.gravity)
+    bodies = [engine.createMultiBody(0, engine.createCollisionShape(pybullet.GEOM_PLANE))]
     for box in boxes:
         half = [edge / 2 for edge in box.size]
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX, halfExtents=half, physicsClientId=client
-        )
-        w, x, y, z = box.pose.quaternion
-        bodies.append(
-            pybullet.createMultiBody(
-                box.mass, shape, -1, box.pose.position, [x, y, z, w], physicsClientId=client
-            )
-        )
+        shape = engine.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half)
+        w, *xyz = box.pose.quaternion
+        bodies.append(engine.createMultiBody(box.mass, shape, -1, box.pose.position, [*xyz, w]))
     for body in bodies:  # the scene's friction; nothing else
-        pybullet.changeDynamics(body, -1, lateralFriction=1.0, physicsClientId=client)
+        engine.changeDynamics(body, -1, lateralFriction=1.0)
     for _ in range(480):
-        pybullet.stepSimulation(physicsClientId=client)
-    alone = [
-        pybullet.getBasePositionAndOrientation(body, physicsClientId=client)[0]
-        for body in bodies[1:]
-    ]
-    pybullet.disconnect(client)
+        engine.stepSimulation()
+    alone = [engine.getBasePositionAndOrientation(body)[0] for body in bodies[1:]]
+    engine.disconnect()
     assert np.array_equal(ours[:, :3], np.array(alone))
 
 
@@ -86,7 +77,6 @@ def test_contacts_turn_with_the_hand() -> None:
 
     scene = scenes.grip()
     robot = scene.robot
-    assert robot is not None
     with closing(loaded(PyBullet, scene)) as simulator:
         target, rest = robot.column("initial_position"), np.zeros(len(robot.joints))
         wrist = robot.joint_names.index("panda_joint7")

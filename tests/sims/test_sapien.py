@@ -142,7 +142,6 @@ def test_what_was_before_a_restore_leaves_no_trace(
     """With a cube in the grip: PhysX keeps the contacts of a world that lives on."""
     scene = scenes.grip()
     robot = scene.robot
-    assert robot is not None
     closed = robot.column("initial_position")
     closed[robot.finger_indices] = robot.gripper.closed
     elsewhere = closed + share

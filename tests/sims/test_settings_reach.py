@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import fields, replace
 from typing import Any
 
@@ -27,7 +27,7 @@ from pytest_simbench.testing import scenes
 
 from ..conftest import ADAPTERS, HERE
 from . import settings_told
-from .worlds import Worlds
+from .worlds import Worlds, loaded
 
 Changes = Mapping[str, Any]
 
@@ -209,49 +209,33 @@ SHOWN: dict[str, Changes] = {
 """What only the motion shows, and what the stage says and PhysX may not heed."""
 
 
-@pytest.fixture(scope="module")
-def worlds() -> Iterator[dict[str, Worlds]]:
-    """Of engines with interpreters of their own, by name."""
-    opened: dict[str, Worlds] = {}
-    yield opened
-    for engine in opened.values():
-        engine.worker.close()
+WorldsOf = Callable[[type[Simulator]], Worlds]
 
 
-def loaded(worlds: dict[str, Worlds], name: str, changes: Changes) -> World:
+def elsewhere(worlds_of: WorldsOf, name: str, changes: Changes) -> World:
     """Of an engine with an interpreter of its own."""
-    if name not in worlds:
-        worlds[name] = Worlds(getattr(settings_told, name))
-    return worlds[name].load(SCENE, "default", parity=False, **changes)
+    return worlds_of(getattr(settings_told, name)).load(SCENE, "default", parity=False, **changes)
 
 
-@contextmanager
-def here(name: str, changes: Changes) -> Iterator[Simulator]:
-    cls = adapter(name)
-    simulator = cls(changed(cls.profiles["default"], changes, name))
-    try:
-        simulator.load(SCENE)
-        yield simulator
-    finally:
-        simulator.close()
+def here(name: str, changes: Changes) -> closing[Simulator]:
+    return closing(loaded(adapter(name), SCENE, "default", **changes))
 
 
-def told(worlds: dict[str, Worlds], name: str, changes: Changes) -> dict[str, Any]:
+def told(worlds_of: WorldsOf, name: str, changes: Changes) -> dict[str, Any]:
     """What the engine tells of a world with these changes, by option."""
     if name in HERE:
         with here(name, changes) as simulator:
             return settings_told.tell(simulator)
-    numbers = loaded(worlds, name, changes).process.request("read_back")["told"]
-    found: dict[str, Any] = json.loads(bytes(map(int, numbers)))
-    return found
+    numbers = elsewhere(worlds_of, name, changes).process.request("read_back")["told"]
+    return json.loads(bytes(map(int, numbers)))
 
 
 def moves(
-    worlds: dict[str, Worlds], name: str, changes: Changes, also: Callable[[Any], None] = id
+    worlds_of: WorldsOf | None, name: str, changes: Changes, also: Callable[[Any], None] = id
 ) -> str:
     """A sum of all that moves in such a world; `also` is done to it first."""
     if name not in HERE:
-        world = loaded(worlds, name, changes)
+        world = elsewhere(worlds_of, name, changes)
         world.follow(Trajectory.holding(0.1, GOAL))
         motion = world.wait(SECONDS, log_period=0.0)
         return hashlib.sha256(motion.bodies.tobytes() + motion.joints.tobytes()).hexdigest()
@@ -268,17 +252,13 @@ def moves(
 _unchanged: dict[str, str] = {}
 
 
-def unchanged(worlds: dict[str, Worlds], name: str, base: Changes) -> str:
+def unchanged(worlds_of: WorldsOf | None, name: str, base: Changes) -> str:
     """The sum without the option that a test is about: made once, and again to be the same."""
     world = f"{name} {base}"
     if world not in _unchanged:
-        _unchanged[world] = moves(worlds, name, base)
-        assert moves(worlds, name, base) == _unchanged[world]
+        _unchanged[world] = moves(worlds_of, name, base)
+        assert moves(worlds_of, name, base) == _unchanged[world]
     return _unchanged[world]
-
-
-def engines(table: Mapping[str, Any]) -> Any:
-    return pytest.mark.parametrize("name", table)
 
 
 def settings(name: str, changes: Changes) -> dict[str, Any]:
@@ -298,21 +278,21 @@ def same(told: Any, asked: Any) -> bool:
     return np.allclose(told, asked, rtol=1e-5, atol=0)
 
 
-@engines(TOLD)
-def test_the_engine_tells_what_was_asked_for(worlds: dict[str, Worlds], name: str) -> None:
+@pytest.mark.parametrize("name", TOLD)
+def test_the_engine_tells_what_was_asked_for(worlds_of: WorldsOf, name: str) -> None:
     """So many times that it tells each option with two values at least; and it has no others."""
     seen: dict[str, list[Any]] = {}
     for changes in ({}, *TOLD[name], {}):  # what a world was given leaves nothing behind
         wanted = settings(name, changes)
-        found = told(worlds, name, changes)
+        found = told(worlds_of, name, changes)
         wrong = {k: (wanted[k], value) for k, value in found.items() if not same(value, wanted[k])}
         assert not wrong, changes
         for option in found:
             seen.setdefault(option, []).append(wanted[option])
     assert [option for option, values in seen.items() if len({*map(str, values)}) < 2] == []
-    elsewhere = {*SHOWN.get(name, {})} | {k for _, changes, _ in SET.get(name, ()) for k in changes}
+    others = {*SHOWN.get(name, {})} | {k for _, changes, _ in SET.get(name, ()) for k in changes}
     options = {field.name for field in fields(adapter(name).profiles["default"])}
-    assert options == seen.keys() | elsewhere, "an option without a test that it reaches"
+    assert options == seen.keys() | others, "an option without a test that it reaches"
 
 
 @pytest.mark.parametrize(
@@ -326,18 +306,18 @@ def test_the_engine_tells_what_was_asked_for(worlds: dict[str, Worlds], name: st
 def test_an_option_does_what_the_engines_own_function_does(
     name: str, base: Changes, changes: Changes, set_: Callable[[Any], None]
 ) -> None:
-    by_option = moves({}, name, {**base, **changes})
-    assert by_option != unchanged({}, name, base)
-    assert by_option == moves({}, name, base, set_)
+    by_option = moves(None, name, {**base, **changes})
+    assert by_option != unchanged(None, name, base)
+    assert by_option == moves(None, name, base, set_)
 
 
 @pytest.mark.parametrize(
     ("name", "option"),
     [pytest.param(name, option, id=f"{name}-{option}") for name in SHOWN for option in SHOWN[name]],
 )
-def test_an_option_changes_the_motion(worlds: dict[str, Worlds], name: str, option: str) -> None:
-    without = unchanged(worlds, name, {})
-    assert moves(worlds, name, {option: SHOWN[name][option]}) != without
+def test_an_option_changes_the_motion(worlds_of: WorldsOf, name: str, option: str) -> None:
+    without = unchanged(worlds_of, name, {})
+    assert moves(worlds_of, name, {option: SHOWN[name][option]}) != without
 
 
 def test_every_adapter_is_here() -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 
 import numpy as np
-import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pytest_simbench.sims.ovphysx.usd_text import attributes, mass_lines, prim, turn_from_x
 
@@ -18,15 +17,13 @@ quaternions = st.tuples(number, number, number, number).filter(lambda q: np.lina
 
 
 @given(axis=vectors)
+@example((1.0, 0.0, 0.0))
+@example((-1.0, 0.0, 0.0))
+@example((0.0, -1.0, 0.0))
 def test_turn_from_x_brings_x_to_the_axis(axis: tuple[float, float, float]) -> None:
     turned = rotation_matrix(turn_from_x(np.array(axis))) @ [1.0, 0.0, 0.0]
-    np.testing.assert_allclose(turned, np.array(axis) / np.linalg.norm(axis), atol=1e-6)
-
-
-@pytest.mark.parametrize("axis", [(1, 0, 0), (-1, 0, 0), (0, -1, 0), (0, 0, 1)])
-def test_turn_from_x_to_an_axis_of_the_frame(axis: tuple[float, float, float]) -> None:
-    turned = rotation_matrix(turn_from_x(np.array(axis, dtype=float))) @ [1.0, 0.0, 0.0]
-    np.testing.assert_allclose(turned, axis, atol=1e-15)
+    off = 1e-15 if np.count_nonzero(axis) == 1 else 1e-6
+    np.testing.assert_allclose(turned, np.array(axis) / np.linalg.norm(axis), atol=off)
 
 
 def written(lines: list[str], name: str) -> FloatArray:

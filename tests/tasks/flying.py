@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose
 from pytest_simbench.tasks.base import CUBE_SIZE
 from tests.tasks.scripted import HALF, Mishap, ScriptedProcess
 
-GRAVITY = np.array([0.0, 0.0, -9.80665])
+GRAVITY = np.array(STANDARD_GRAVITY)
 
 PUSH_TIME = 0.2
 """For which a pushed cube is on its way [s]."""

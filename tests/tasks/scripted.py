@@ -254,7 +254,7 @@ class ScriptedWorld(World):
     """A world that also knows the simulated time of each moment that the task marked."""
 
     def __init__(self, process: ScriptedProcess, scene: Scene) -> None:
-        super().__init__(process, scene)  # type: ignore[arg-type]
+        super().__init__(process, scene)
         self.scripted = process
 
     def mark(self, moment: str) -> None:

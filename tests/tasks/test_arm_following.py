@@ -20,8 +20,7 @@ from tests.tasks.reached import reached
 
 @pytest.fixture(scope="module")
 def runs() -> ArmRuns:
-    found: ArmRuns = measured("arm_pushes")
-    return found
+    return measured("arm_pushes")
 
 
 def test_joints_move_at_30_degrees_a_second_and_then_halve_what_is_missing() -> None:

@@ -35,7 +35,7 @@ def test_the_arm_is_described_as_engines_take_it(tmp_path: Path) -> None:
     assert [joint.get("type") for joint in joints] == ["revolute", "fixed", "fixed"]
     before, after = (
         Rotation.from_euler("xyz", [float(part) for part in text.split()])
-        for text in ("0.1 0.2 0.3", joints[1].find("origin").get("rpy"))  # type: ignore[union-attr]
+        for text in ("0.1 0.2 0.3", joints[1].find("origin").get("rpy"))
     )
     assert (before.inv() * after).as_rotvec() == pytest.approx([0.0, 0.0, 0.5])
 

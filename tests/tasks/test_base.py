@@ -185,12 +185,14 @@ def test_a_parameter_that_cannot_be(task: Any, parameters: dict[str, Any], said:
         task(**parameters)
 
 
-TASKS = [Stacking(), Throwing()]
-
-
 @pytest.mark.parametrize("name", ["panda", "ur5", "ur10", "xarm7"])
 @pytest.mark.parametrize(
-    ("task", "digest"), [(Stacking(), "c39209f7b4fa93f7"), (Throwing(), "d6760dd99de38895")]
+    ("task", "digest"),
+    [
+        (Stacking(), "c39209f7b4fa93f7"),
+        (Throwing(), "d6760dd99de38895"),
+        (CurvePushing(), "46efc9e664e6d517"),
+    ],
 )
 def test_arms_of_full_reach_have_the_scene_they_had(task: Task, digest: str, name: str) -> None:
     """To the last bit: digests of November 2026, from before scenes had a scale."""
@@ -199,14 +201,17 @@ def test_arms_of_full_reach_have_the_scene_they_had(task: Task, digest: str, nam
     assert hashlib.sha256(told.encode()).hexdigest()[:16] == digest
 
 
-@pytest.mark.parametrize("task", TASKS, ids=lambda task: task.name)
-def test_a_small_arm_has_a_similar_scene(task: Task) -> None:
+@pytest.mark.parametrize(
+    ("task", "scale"), [(Stacking(), 0.4), (Throwing(), 0.4), (CurvePushing(), 0.5)]
+)
+def test_a_small_arm_has_a_similar_scene(task: Task, scale: float) -> None:
+    """At the same density."""
     still = Jitter(0.0, 0.0)
     small = task.on(find("so101"))
-    assert small.parameters()["task.scale"] == 0.4
+    assert small.parameters()["task.scale"] == scale
     assert small.problem() is None
     pairs = zip(small.scene(0, still).bodies, task.scene(0, still).bodies, strict=True)
     for body, other in pairs:
-        assert body.extents == pytest.approx(np.multiply(0.4, other.extents))
-        assert body.pose.position == pytest.approx(np.multiply(0.4, other.pose.position))
-        assert body.mass == pytest.approx(0.4**3 * other.mass)
+        assert body.extents == pytest.approx(np.multiply(scale, other.extents))
+        assert body.pose.position == pytest.approx(np.multiply(scale, other.pose.position))
+        assert body.mass == pytest.approx(scale**3 * other.mass)

@@ -45,7 +45,6 @@ def test_nothing_on_the_way_pulls_harder_than_the_shaking() -> None:
     most = ACCELERATION - STANDARD_GRAVITY[2]
     assert TASK.mass * most == pytest.approx(TASK.load * 2 * FRICTION * TASK.arm.gripper.squeeze)
     model, after = process.model, False
-    assert model is not None
     pulls = []
     for asked in process.asked:
         if asked.kind == "follow" and after:

@@ -29,7 +29,6 @@ def limp(seen: Observation) -> None:
 
 def to_the_goal(seen: Observation) -> Command:
     """Straight there, the tool pointing down."""
-    assert seen.goal is not None
     return Command(tool=Pose(seen.goal.position, DOWNWARD.quaternion))
 
 

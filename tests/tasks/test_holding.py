@@ -104,5 +104,4 @@ def test_an_arm_sags_as_its_spring_and_its_own_stop_at_the_keyframe(
 def test_it_starts_at_the_keyframe() -> None:
     scene = replace(SCENE, starts=(Start((), (), (0.1, 0.2)),))
     robot = Holding(scene).scene(5, Jitter()).robot
-    assert robot is not None
     assert robot.column("initial_position").tolist() == [0.1, 0.2]

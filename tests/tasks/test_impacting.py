@@ -78,7 +78,7 @@ def test_the_scene_is_the_flight_before_the_impact() -> None:
 
 
 def strike(case: Case, task: Impacting) -> list[Record]:
-    return tossed(case, task, range(1, task.repetitions + 1))  # type: ignore[arg-type]
+    return tossed(case, task, range(1, task.repetitions + 1))
 
 
 @pytest.mark.parametrize(("name", "off_by"), [("mujoco", 12.0), ("pybullet", 4.0)])

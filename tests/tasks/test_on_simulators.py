@@ -64,7 +64,6 @@ def test_a_shorter_wait_changes_no_count_and_is_never_pooled_with_a_full_one(cas
     for name in ("moved", "hit", "moved_otherwise"):
         assert short.metrics[name] == full.metrics[name] is not None
     wait = Record.from_json(short.to_json()).notes.wait
-    assert wait is not None
     assert (wait.seconds, wait.of, wait.reach < wait.slack) == (pytest.approx(2.0), 6.0, True)
     assert full.notes.wait == Wait(pytest.approx(6.0), 6.0)
     assert short.stepping["simulated"] == full.stepping["simulated"]

@@ -62,7 +62,7 @@ def test_a_log_of_another_scene_is_refused() -> None:
 
 def test_turns_are_angles_whatever_the_quaternions_signs() -> None:
     a, b = Pose.at(0, 0, 0, yaw=0.2), Pose.at(1, 0, 0, yaw=0.5)
-    flipped = Pose(b.position, tuple(-q for q in b.quaternion))  # type: ignore[arg-type]
+    flipped = Pose(b.position, tuple(-q for q in b.quaternion))
     assert turn(a, b) == turn(b, a) == turn(a, flipped) == pytest.approx(math.degrees(0.3))
     assert turn(a, a) == 0.0
 

@@ -56,7 +56,6 @@ def test_starts_are_moved_on_request_alone_and_by_the_seed() -> None:
 
 def test_joints_start_elsewhere_too_but_for_coupled_ones_and_within_their_ranges() -> None:
     scene = Scene("arm", (), panda())
-    assert scene.robot is not None
     lowest = replace(scene.robot.joints[0], initial_position=-2.8973)  # the end of its range
     robot = replace(scene.robot, joints=(lowest, *scene.robot.joints[1:]))
     was = robot.column("initial_position")

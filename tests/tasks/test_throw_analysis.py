@@ -27,8 +27,7 @@ from pytest_simbench.tasks.throw_analysis import (
 )
 from pytest_simbench.testing.scenes import grip
 from pytest_simbench.testing.subject import Subject
-
-GRAVITY = np.array([0.0, 0.0, -9.80665])
+from tests.tasks.flying import GRAVITY
 
 
 def flight(release: float, contact: float, share: float = 1.0) -> tuple[Any, ...]:
@@ -176,6 +175,7 @@ THROWN = going(0.0, 2.0, 0.0, 0.475)
 
 HIT = going(1.0, 1.0, 0.475, 0.6)
 ASIDE = going(1.0, 1.0, 0.475, 0.6, y=0.2)
+LEANS = going(1.05, 1.0, 0.475, 0.6)
 
 
 @pytest.mark.parametrize(
@@ -188,11 +188,8 @@ ASIDE = going(1.0, 1.0, 0.475, 0.6, y=0.2)
         ([HIT, ASIDE], (0,)),
         ([ASIDE], ()),
         ([going(1.0, 0.03, 0.475, 4.0)], ()),  # creep
-        (
-            [going(1.0, 1.0, 0.475, 0.6), going(1.05, 1.0, 0.475, 0.6)],
-            (0, 1),
-        ),  # leans on the nearer
-        ([going(1.05, 1.0, 0.475, 0.6), going(1.0, 1.0, 0.475, 0.6)], (1, 0)),
+        ([HIT, LEANS], (0, 1)),  # on the nearer
+        ([LEANS, HIT], (1, 0)),
         ([going(1.051, 1.0, 0.2, 0.3), going(1.0, 1.0, 0.475, 0.52)], (1,)),  # 0 left by itself
     ],
 )

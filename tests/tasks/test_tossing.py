@@ -72,7 +72,9 @@ def test_consecutive_seeds_go_through_the_tosses_of_a_half_once() -> None:
     assert task.repetitions == 2
     assert {task.real(seed).index for seed in range(2022, 2024)} == {1, 3}
     assert task.sample(2022) == ("cube_tosses", task.real(2022).index)
-    assert Tossing(FLIGHTS, half="chosen_on").real(2022).index == 2
+    tuning = Tossing(FLIGHTS, half="chosen_on")
+    assert tuning.real(2022).index == 2
+    assert tuning.smoke() == replace(tuning, most=5)
     assert Tossing(FLIGHTS, most=1).repetitions == 1
 
 
@@ -84,11 +86,6 @@ def test_the_scene_starts_as_the_toss_did_and_is_not_disturbed() -> None:
     assert box.linear_velocity == (1.0, -0.5, 0.0)
     assert box.angular_velocity == pytest.approx(tuple(toss.start.rotation() @ SPIN))
     assert (box.inertia() == 8.1e-4).all()
-
-
-def test_smoke_is_the_first_few_of_the_same_half() -> None:
-    task = Tossing(FLIGHTS, half="tuning")
-    assert task.smoke() == Tossing(FLIGHTS, half="tuning", most=5)
 
 
 def test_records_name_the_tosses_by_their_digest() -> None:

@@ -48,7 +48,6 @@ class Gliding:
 
     def wait(self, duration: float, *, log_period: float | None = None) -> Motion:
         self.asked += 1
-        assert log_period is not None
         steps, every = (max(1, round(t / self.timestep)) for t in (duration, log_period))
         times = self.time + self.timestep * np.arange(every, steps + 1, every)
         self.time += steps * self.timestep
@@ -65,7 +64,7 @@ def waited(
         assert motion.time[-1] == pytest.approx(world.time)
         yield Slack("a", "beyond", abs(float(motion.bodies[-1, 0, 0]) - at))
 
-    _, wait = settle(world, seconds, slacks, full=full)  # type: ignore[arg-type]
+    _, wait = settle(world, seconds, slacks, full=full)
     assert wait.seconds == pytest.approx(world.time - world.began)
     assert world.worked == {"simulated": world.began}  # what the wait costs does not count
     return wait, world.paths[0](world.time - world.began) > at

@@ -57,7 +57,6 @@ def fit(
     scene = changed(SCENE, scene_truth)
 
     def run(task: Fitting, name: str) -> Any:
-        assert task.world.robot is not None
         slider = task.world.robot.joints[1]
         values = {name: getattr(slider, name.partition(":")[0]) for name in TRUTH}
         off = motion(values, slider.initial_position) - measured

@@ -105,7 +105,6 @@ def test_a_helper_counts_while_it_lives_and_once_it_has_ended(helper: str) -> No
     family = Family()
     before = family.cpu()
     with subprocess.Popen([sys.executable, "-c", helper], **pipes) as child:
-        assert child.stdout is not None
         child.stdout.readline()
         family.meet()
         living = family.cpu() - before

@@ -305,7 +305,6 @@ def test_statistics(ask: Asked) -> None:
 def test_it_waits_for_the_wall_clock_where_asked(ask: Asked) -> None:
     ask.construct(real_time=True)
     ask.load()
-    assert ask.server.stepper is not None
     assert ask.server.stepper.real_time is True
     ask.construct()
     ask.load()

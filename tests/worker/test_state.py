@@ -45,7 +45,6 @@ class Turning(Falling):
         return Scene("turning", cubes, ROBOT)
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        assert ROBOT is not None
         start = ROBOT.column("initial_position")
         position = np.tile(start, (200, 1))
         for joint, angle in enumerate((0.5, -0.1, -0.4)):

@@ -274,7 +274,6 @@ class Told(Toy):
 def told(scene: Scene, steps: int) -> Told:
     simulator = Told()
     acting = Acting.of(simulator, scene)
-    assert acting is not None
     simulator.pushed.clear()
     simulator.led.clear()
     act = acting.steps()
@@ -308,7 +307,6 @@ def test_it_is_told_in_each_step_of_a_wait() -> None:
 def test_a_motion_goes_on_from_the_simulators_time() -> None:
     simulator = Told()
     acting = Acting.of(simulator, Scene("s", (BELT,)))
-    assert acting is not None
     simulator.steps = 100  # restored
     acting.steps()()
     before, after = simulator.led[-1]

@@ -142,20 +142,6 @@ def test_nobody_leads_with_nothing() -> None:
     )
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 4])
-def test_few_repetitions_are_not_compared(count: int) -> None:
-    records = [
-        record(name, k, metrics={"placed": placed, "at_end": placed})
-        for name, placed in (("good", 1.0), ("poor", 0.0))
-        for k in range(count)
-    ]
-    (found,) = summarise(records, METRICS)
-    assert {d.verdict for d in found.differences} == {"undecided"}
-    assert sentences(found)[0].endswith(
-        f"; a difference needs at least 6 pairs that differ; so far {count}."
-    )
-
-
 def test_lower_is_better_where_the_metric_says_so_and_a_single_one_has_no_rank() -> None:
     assert sentences(task({"a": 0.5}))[0] == "score: a 50 % [40, 60]."
     metric = Metric("score", "error", "m", "lower", study=True)

@@ -33,7 +33,7 @@ def claim(simulator: str = "mujoco", verdict: str = "PASS", **changes: Any) -> C
         "mean": 1.0,
         "n": 20,
     }
-    return Claim(verdict=verdict, **{**given, **changes})  # type: ignore[arg-type]
+    return Claim(verdict=verdict, **{**given, **changes})
 
 
 def stacked(simulator: str, k: int, placed: float | None) -> Any:

@@ -71,7 +71,6 @@ def test_failed_repetitions_count_and_interrupted_ones_are_left_out() -> None:
     )
     assert (row.finished, row.failed, row.interrupted, row.attempts) == (2, 3, 1, 5)
     placed = row.metrics["placed"]
-    assert placed is not None
     assert (placed.count, placed.min, placed.max) == (5, 0.0, 0.8)  # a crash is the worst
     assert placed.mean == pytest.approx(1.4 / 5)
     hung, died = row.causes
@@ -91,7 +90,6 @@ def test_intervals_are_those_the_assertions_use(sole: bool) -> None:
     row, results = only(*records), ResultSet(records, STACKING)
     for metric in STACKING:
         found, expected = row.metrics[metric.name], results.interval(metric.name)
-        assert found is not None
         assert found.mean == pytest.approx(expected.mean)
         constant = expected.method == "constant"  # all values alike: there is no interval
         ends = (None, None) if constant else (expected.low, expected.high)
@@ -120,7 +118,6 @@ def test_the_deviation_is_of_all_samples_with_each_repetition_counting_the_same(
     mean = np.average(together, weights=weights)
     std = np.sqrt(np.average((together - mean) ** 2, weights=weights))
     found = costs["cpu"]
-    assert found is not None
     assert math.isclose(found.mean, mean, abs_tol=1e-9)
     assert math.isclose(found.std, std, rel_tol=1e-9, abs_tol=1e-6)
     assert found.low is None or found.low <= found.mean <= (found.high or 0.0)
@@ -144,7 +141,6 @@ def test_phases_are_pooled_each_by_itself_and_a_peak_is_the_largest() -> None:
     cpu, memory = found["load"]
     assert (cpu.mean, memory.mean, cpu.std, memory.std) == pytest.approx((65, 115, 15, 15))
     peaks = pooled([use(50.0, 100.0, 3, peak=peak) for peak in (120.0, 180.0, 150.0)], "ram")
-    assert peaks is not None
     assert peaks.peak == 180.0
 
 
@@ -220,7 +216,6 @@ def test_what_is_far_below_the_resolution_is_nothing(
 def test_yes_or_no_is_told_by_how_many_said_yes(yes: int) -> None:
     hit = Metric("hit", "hit", kind="yes_no")
     found = spread([1.0] * yes + [0.0] * (20 - yes), hit)
-    assert found is not None
     lines = [f"{yes} of 20", f"{5 * yes} {interval(found, hit)}"]
     assert cells.spread(found, hit) == cells.mean_first(found, hit)
     assert (cells.spread(found, hit).lines, cells.spread(found, hit).sort) == (lines, yes / 20)
@@ -228,15 +223,12 @@ def test_yes_or_no_is_told_by_how_many_said_yes(yes: int) -> None:
 
 def test_an_end_far_nearer_to_0_than_to_the_other_is_0() -> None:
     found = spread([0.0] * 19 + [1.0], Metric("picks", "picks", least=0))
-    assert found is not None
-    assert found.low is not None
     assert 0 < found.low < 1e-4
     assert interval(found, CUBES).startswith("[0, 0.")
 
 
 def test_a_value_below_the_least_is_shown_without_an_interval() -> None:
     found = spread([0.0, 1.0, 2.0, 1.0, -1.0], Metric("picks", "picks", least=0))
-    assert found is not None
     assert (found.min, found.low, found.high) == (-1.0, None, None)
 
 

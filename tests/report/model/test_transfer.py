@@ -109,7 +109,6 @@ def test_terminal_markdown_and_page_tell_it_first(four: Report, tmp_path: Path) 
 
 
 def test_the_picture(four: Report, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib", reason="pictures need the extra 'figures'")
     with drawing():
         (axis,) = draw(four.transfers[0]).axes
         drawn = [text.get_text() for text in axis.texts]

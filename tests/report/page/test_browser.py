@@ -89,7 +89,7 @@ def test_tables_sort_by_number_and_by_name(
     assert len(before) == 5
     placed.click()
     up = column(page, 0, 2)
-    values = [float(re.search(r"\d+", text)[0]) for text in up]  # type: ignore[index]
+    values = [float(re.search(r"\d+", text)[0]) for text in up]
     assert values == sorted(values)
     assert rows(page) != before
     placed.focus()

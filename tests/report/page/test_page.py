@@ -40,7 +40,6 @@ def test_cells_tell_mean_interval_and_ends_and_sort_by_the_mean() -> None:
     cell = columns["placed %"].cells[1]
     assert cell.lines == ["65", "[40, 78]", "0 to 87"]  # three crashed
     spread = summary.rows[1].metrics["placed"]
-    assert spread is not None
     assert (cell.sort, cell.verdict) == (spread.mean, "behind")
     assert [cell.of for cell in columns["simulator"].cells] == [row.of for row in summary.rows]
 
@@ -155,15 +154,11 @@ def test_shares_lie_between_nothing_and_all() -> None:
     assert first.value == "93 %"
     assert first.x == pytest.approx(LEFT + (RIGHT - LEFT) * 14 / 15, abs=0.01)
     line = plot.lines[0]
-    assert line.low is not None
-    assert line.mean is not None
-    assert line.high is not None
     assert line.low < line.mean < line.high <= RIGHT
 
 
 def test_values_keep_their_order_and_the_reference_has_its_place() -> None:
     plot = plots(throwing_run())["landing x m"]
-    assert plot.reference is not None
     assert max(dot.x for dot in plot.lines[1].dots) < plot.reference
     assert min(dot.x for dot in plot.lines[0].dots) > plot.reference
     assert not plot.study

@@ -20,17 +20,13 @@ from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.replay.recorded import groups
 from pytest_simbench.report.replay.render import replay_of
 from pytest_simbench.scene import Pose
-from tests.hostile import HOSTILE
 from tests.recordings.samples import motion, scene
 from tests.report.browser import PLAIN, Opened, browser, opened
-from tests.report.page.test_hostile_page import MORE
+from tests.report.page.test_browser import SIZES, STRANGE
 from tests.report.samples import METRICS, record
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
-
-SIZES = [(400, 800), (1400, 900)]
-STRANGE = "".join(text for text in (*HOSTILE, *MORE) if len(text) < 1000)
 
 __all__ = ["browser", "opened"]  # fixtures
 
@@ -166,7 +162,6 @@ def test_links_and_cubes_are_where_the_trace_has_them(replay: Path, opened: Open
     """The player's own forward kinematics against Python's."""
     page = show(opened, replay)
     kept = Trace.of(scene(), longer(2.0), [])
-    assert kept.figure is not None
     names = [*kept.figure.links[1:], "body 0", "body 1"]
     expected = np.concatenate([kept.links()[:, 1:], kept.bodies[:, :, :7]], axis=1)
     for k in (0, 5, 11):

@@ -68,12 +68,7 @@ def test_a_trace_that_is_none_is_told_and_the_rest_shown(tmp_path: Path) -> None
     assert "holds no arrays" in problems[0]
     assert '"label":"mujoco"' in page
     assert "drake" not in page
-
-
-def test_without_any_trace_there_is_no_page(tmp_path: Path) -> None:
-    kept = keep(tmp_path, record("drake", 1))
-    (tmp_path / "traces" / f"{file_stem_of(kept[0])}.npz").write_text("no zip")
-    assert replay_of(groups(tmp_path, kept))[:2] == ("", 0)
+    assert replay_of(groups(tmp_path, kept[:1]))[:2] == ("", 0)  # without any trace no page
 
 
 def test_what_does_not_fit_is_left_out_and_told(

@@ -1,4 +1,5 @@
-"""Adapters of other packages that are broken spoil no other, and are told by their reason."""
+"""Adapters of other packages: one that works runs all suites without a change in this one; those
+that are broken spoil no other, and are told by their reason."""
 
 from __future__ import annotations
 
@@ -7,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from pytest_simbench.laws import LAWS
 from tests.cli.command import simbench
-from tests.plugin.inner import FALLING, distribution, importable, run_pytest, usage_error
+from tests.plugin.inner import FALLING, distribution, importable, records, run_pytest, usage_error
 
 GOOD = """
 from dataclasses import replace
@@ -146,3 +148,48 @@ def test_a_profile_that_one_simulator_lacks(pytester: pytest.Pytester, site: Pat
     result = run_pytest(pytester, "--sim=good")
     usage_error(result, "*good has no settings profile 'tuned'; choose from default")
     run_pytest(pytester, "--sim=good --sim-profile=tuned,default --reps=1", passed=1, skipped=1)
+
+
+COARSER = '''
+"""A third party's simulator: MuJoCo with a coarser step, under its own name."""
+
+from dataclasses import replace
+
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
+
+
+class Elsewhere(MuJoCo):
+    info = replace(MuJoCo.info, name="elsewhere", title="Elsewhere")
+    profiles = {
+        "default": MuJoCoSettings(),
+        "tuned": replace(MuJoCo.profiles["tuned"], timestep=0.002, solref=(0.004, 1.0)),
+    }
+'''
+
+
+def test_third_party_simulator_runs_all_suites(
+    pytester: pytest.Pytester, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = "elsewhere = elsewhere_simbench:Elsewhere"
+    importable(
+        monkeypatch, distribution(pytester.path / "site", "elsewhere-simbench", entry, COARSER)
+    )
+    suites = Path(request.config.rootpath, "suites")
+    output = pytester.path / "out"
+    monkeypatch.delenv("SIMBENCH_DATA", raising=False)
+    result = pytester.runpytest_subprocess(
+        str(suites), "--sim=elsewhere", "--protocol=smoke", f"--sim-output={output}",
+        "-k", "not test_law or free_fall",
+    )  # fmt: skip
+    result.assert_outcomes(passed=9, skipped=17, deselected=len(LAWS) - 1)  # no data, no files
+    kept = records(output)
+    assert [(r["simulator"], r["task"], r["status"]) for r in kept] == [
+        ("elsewhere", "free_fall", "ok"),
+        ("elsewhere", "pushing", "ok"),
+        ("elsewhere", "pushing_curve", "ok"),
+        ("elsewhere", "stacking", "ok"),
+        ("elsewhere", "throwing", "ok"),
+    ]
+    assert {r["settings"]["timestep"] for r in kept} == {0.002}
+    assert "elsewhere: Elsewhere" in simbench(pytester, "list", "-v").stdout.str()
