@@ -42,8 +42,10 @@ def test_a_grip_that_creeps(
     assert after.startswith(before)
     made = [json.loads(line) for line in after.splitlines()]
     assert len({(r["test"], r["task"], r["repetition"]) for r in made}) == len(made)
-    untimed = (json.dumps({**record, "seconds": {}}) + "\n" for record in made)
-    (tmp_path / "out/records.jsonl").write_text("".join(untimed))
+    for record in made:  # today's tell the time-out of the others, which they must agree on
+        record["seconds"] = record["seconds"] if "today" in record["test"] else {}
+    lines = (json.dumps(record) + "\n" for record in made)
+    (tmp_path / "out/records.jsonl").write_text("".join(lines))
     (tmp_path / "out/front.png").unlink()
     (tmp_path / "out/front.png").mkdir()
     assert main([*SLIPS, *few, "--trials", "8"]) == 2
