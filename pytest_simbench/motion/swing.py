@@ -268,7 +268,7 @@ def main(arguments: Sequence[str]) -> int:
             scale,
         )
     except RobotError as error:
-        parser.exit(1, f"{error}\n")
+        parser.exit(2, f"{parser.prog}: {error}\n")
     print("[throw]")
     for name, joints in (("start", start), ("end", end)):
         print(f"{name} = {[round(float(angle), 4) for angle in joints]}")

@@ -38,6 +38,8 @@ def read_baseline(path: Path) -> RunContents:
     """
     if not path.exists():
         raise BaselineError(f"there is no baseline {path}; give {FORMS}")
+    if path.is_dir() and not RunFolder(path).holds_run:
+        raise BaselineError(f"the folder {path} holds no run; give {FORMS}")
     saved = _benchmark_file(path)
     if saved is not None:
         return from_benchmarks(saved, str(path))
