@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from copy import copy, deepcopy
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from threading import Lock
 from types import MethodType
 from typing import Any, ClassVar
@@ -293,6 +293,10 @@ def digest(policy: Any) -> str:
     network, for instance) do not count."""
     text, held = [name_of(policy)], {**getattr(policy, "__dict__", {})}
     made = policy._act if isinstance(policy, Function) else policy
+    while isinstance(made, partial):
+        held |= {f"argument {k}": value for k, value in enumerate(made.args)} | made.keywords
+        made = made.func
+    held |= getattr(getattr(made, "__self__", made), "__dict__", {})  # of a method, an object
     with suppress(TypeError):
         held |= inspect.getclosurevars(made).nonlocals
     with suppress(OSError, TypeError), _PARSING:

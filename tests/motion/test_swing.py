@@ -67,8 +67,8 @@ def test_too_far_is_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["ur5", "--landing=30"])
     assert ended.value.code == 2
-    said = "simbench swing: robot 'ur5' cannot throw to x = 30 m: no swing within its limits was found\n"
-    assert capsys.readouterr().err == said
+    said = "robot 'ur5' cannot throw to x = 30 m: no swing within its limits was found\n"
+    assert capsys.readouterr().err == f"simbench swing: {said}"
     with pytest.raises(SystemExit):
         main(["ur7"])
     assert "unknown robot 'ur7'; choose from" in capsys.readouterr().err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.motion.kinematics import DOWNWARD
 from pytest_simbench.motion.registry import known_robot
 from pytest_simbench.scene import Pose
-from pytest_simbench.scene.policy import Command, Observation
+from pytest_simbench.scene.policy import Command, Observation, as_policy
 from pytest_simbench.tasks import GoalTask, Jitter, PickAndPlace, PushingToGoal, Reaching
 from pytest_simbench.tasks.goals import digest
 from tests.conftest import performed
@@ -78,6 +79,9 @@ def test_a_record_tells_which_policy_it_was() -> None:
         def __init__(self, gain: Any) -> None:
             self.gain = gain
 
+        def act(self, seen: Observation) -> float:
+            return self.gain
+
     large = np.zeros(2000)
     for one, other in (
         (1.0, 2.0), ([1], (2,)), (np.float32(1), np.float32(2)), ([large], [large + 1e-12]),
@@ -90,6 +94,16 @@ def test_a_record_tells_which_policy_it_was() -> None:
         return lambda seen: gain
 
     assert digest(closed(1.0)) == digest(closed(1.0)) != digest(closed(2.0))
+
+    def open_loop(gain: float, seen: Observation) -> float:
+        return gain
+
+    for bound in (  # functions with an argument, and methods
+        lambda gain: as_policy(partial(open_loop, gain)),
+        lambda gain: as_policy(partial(partial(open_loop), gain=gain)),
+        lambda gain: as_policy(Held(gain).act),
+    ):
+        assert digest(bound(1.0)) == digest(bound(1.0)) != digest(bound(2.0))
 
 
 @pytest.mark.engine
