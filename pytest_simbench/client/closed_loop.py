@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.client.errors import PolicyFailed, WorkerError
+from pytest_simbench.client.errors import PolicyFailed, WorkerError, WorkerHung
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.ground.errors import PolicyError
 from pytest_simbench.scene import Pose, Scene
@@ -275,6 +275,10 @@ class Episode:
         seconds = self.at_most if callable(self.until) else self.until
         return checked(seconds, "the seconds of a closed loop", above=True)
 
+    @property
+    def name(self) -> str:
+        return getattr(self.policy, "name", type(self.policy).__name__)
+
     def inner(
         self, process: WorkerProcess, scene: Scene, timestep: float, log_period: float | None
     ) -> Mapping[str, Any]:
@@ -285,10 +289,14 @@ class Episode:
         if refused := [name for name, value in {**asked, **vars(self.looking)}.items() if value]:
             raise LoopError(f"a policy inside the worker takes no {refused[0]}")
         most = max(1, round(self.seconds * self.rhythm.rate))
-        answer: Mapping[str, Any] = process.request(
-            "close_loop", every=every, most=most, late=late, log_period=log_period,
-            forces=False, picture=None, inside=shipped(self.policy, self.seed, self.goal),
-        )  # fmt: skip
+        try:
+            answer: Mapping[str, Any] = process.request(
+                "close_loop", every=every, most=most, late=late, log_period=log_period,
+                forces=False, picture=None, inside=shipped(self.policy, self.seed, self.goal),
+            )  # fmt: skip
+        except WorkerHung as error:
+            told = f"the policy {self.name}, which ran inside it, may be what stalls"
+            raise WorkerHung(f"{error.what}; {told}", process.where, error.log_tail) from None
         return answer
 
     def outer(
@@ -300,7 +308,7 @@ class Episode:
             The worker's answer, the states at each observation, and the seconds that the policy
             took.
         """
-        watched = Watched(process, getattr(self.policy, "name", type(self.policy).__name__))
+        watched = Watched(process, self.name)
         states: list[Observation] = []
         loop: ClosedLoop | None = None
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.client import connection
-from pytest_simbench.client.errors import PolicyFailed, Where, WorkerExited
+from pytest_simbench.client.errors import PolicyFailed, Where, WorkerExited, WorkerHung
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
@@ -26,7 +26,7 @@ from pytest_simbench.scene.policy import Command, LoopError, Observation, Policy
 from pytest_simbench.tasks import Reaching
 from pytest_simbench.tasks.base import cube
 from tests.client.failing import failure
-from tests.client.waving import Waving, still, writing
+from tests.client.waving import Waving, stalling, still, writing
 
 SCENE = Scene("arm", (cube("a", Pose.at(0.5, 0.3, 0.025), (1.0,) * 4),), panda())
 Worlds = Callable[..., World]
@@ -186,6 +186,13 @@ def test_inside_too_and_nothing_of_it_delays_the_next(
     with pytest.raises(PolicyFailed, match=r"raised SystemExit: too far \(waving.py:2"):
         one.control(Waving(9.0), until=1.0, inside=True)
     one.control(still, until=0.1)
+
+
+def test_one_that_stalls_inside_is_named(world: Worlds) -> None:
+    with pytest.raises(
+        WorkerHung, match="policy stalling, which ran inside it"
+    ):
+        world(stall_timeout=2.0).control(stalling, until=1.0, inside=True)
 
 
 @pytest.mark.parametrize("inside", [False, True])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from pytest_simbench.scene.policy import Command, Observation, Policy
@@ -29,6 +31,11 @@ class Waving(Policy):
 
 def still(observation: Observation) -> None:
     """Does nothing."""
+
+
+def stalling(observation: Observation) -> None:
+    """Gives no answer."""
+    time.sleep(30.0)
 
 
 def writing(observation: Observation) -> None:
