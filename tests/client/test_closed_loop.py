@@ -189,9 +189,7 @@ def test_inside_too_and_nothing_of_it_delays_the_next(
 
 
 def test_one_that_stalls_inside_is_named(world: Worlds) -> None:
-    with pytest.raises(
-        WorkerHung, match="policy stalling, which ran inside it"
-    ):
+    with pytest.raises(WorkerHung, match="policy stalling, which ran inside it"):
         world(stall_timeout=2.0).control(stalling, until=1.0, inside=True)
 
 
