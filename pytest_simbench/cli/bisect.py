@@ -81,7 +81,14 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
 
 
 def start(span: Span, metric: str, arguments: Sequence[str]) -> int:
-    """Have the plugin of pytest call `bisect` for these tests and options; pytest's exit code."""
+    """Have the plugin of pytest call `bisect` for these tests and options; pytest's exit code.
+
+    Raises:
+        BadInput: a file of tests that is not there, told before releases are installed.
+    """
+    for path in (word.partition("::")[0] for word in arguments):
+        if path.endswith(".py") and not Path(path).exists():
+            raise BadInput(f"there is no file {path}; name the file of the tests")
     releases = f"{span.name}:{span.good}..{span.bad}"
     own = [sys.modules[__name__]]  # tells the plugin who asks
     return int(pytest.main([*arguments, "--sim-bisect", releases, metric], plugins=own))

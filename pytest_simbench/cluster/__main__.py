@@ -131,7 +131,7 @@ async def _head(given: argparse.Namespace) -> int:
 
 async def _node(given: argparse.Namespace) -> int:
     import dask
-    from distributed import Nanny
+    from distributed import Nanny, Security
     from distributed.comm import get_address_host, resolve_address
     from distributed.utils import get_ip
 
@@ -139,6 +139,11 @@ async def _node(given: argparse.Namespace) -> int:
     names = [name.strip() for name in given.sim.split(",")] if given.sim else None
     if given.slots < 1:
         raise ValueError("--slots: give a whole number from 1")
+    tls = given.address.lower().startswith("tls")
+    if tls and Security().get_connection_args("worker").get("ssl_context") is None:
+        raise ValueError(
+            "tls:// needs certificates for the worker in Dask's configuration (docs/cluster.md)"
+        )
     check_names(names or [])
     offers = here(given.slots, names)
     head = get_address_host(resolve_address(given.address))

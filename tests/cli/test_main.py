@@ -85,6 +85,7 @@ def test_help_loads_nothing_large() -> None:
         ("report a ./a", "simbench report: ./a: the run is given twice"),
         ("report a b", "simbench report: a and b overlap: both have seed 2022 of *"),
         ("report a --output b", "simbench report: b holds another run; give another --output"),
+        ("bisect mujoco:3.2.7..3.3.7 placed no.py::test_x", "*there is no file no.py; name the *"),
         ("bisect mujoco:3 placed", "*NAME:GOOD..BAD: write it as NAME:GOOD..BAD, with two *"),
         ("bisect mujoco:3..4 a-b", "*METRIC: give the name of a metric; *"),
         ("watch nosuch", "simbench watch: unknown simulator 'nosuch'; choose from *mujoco*"),
