@@ -156,7 +156,8 @@ class ResultSet:
 
     def judge(self, name: str | Metric, claim: Bound) -> Judgement:
         """What the repetitions say of a claim about a metric's true mean."""
-        return self._decide(claim, lambda: self._judged(self.metric(name)))
+        found = self._decide(claim, lambda: self._judged(self.metric(name)))
+        return replace(found, sole=bool(self.records) and all(r.notes.sole for r in self.records))
 
     def _judged(self, metric: Metric) -> Interval:
         """The interval by which claims about a metric, or about crashes, are judged."""

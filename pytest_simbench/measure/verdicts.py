@@ -70,12 +70,14 @@ class Judgement:
     Attributes:
         further: when undecided, about how many more repetitions would decide; None when more
             than any run could have (the mean is at the threshold) or too few are there to tell.
+        sole: whether the test is asked once, as others would be the same: its costs alone differ.
     """
 
     verdict: Verdict
     claim: Bound
     interval: Interval
     further: int | None = 0
+    sole: bool = False
 
     @property
     def advice(self) -> str:
@@ -83,6 +85,8 @@ class Judgement:
         if self.verdict.decided:
             return ""
         if self.verdict is Verdict.NOT_JUDGED:
+            if self.sole:
+                return "it is asked once, which is too few for a claim about a cost"
             return f"a claim needs {FEWEST} repetitions or more"
         if self.further is not None:
             return f"about {self.further} more repetition{'s' * (self.further != 1)} needed"

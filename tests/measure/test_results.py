@@ -225,6 +225,8 @@ def test_the_one_value_that_all_repetitions_would_have_is_judged_as_it_is(name: 
     result.assert_crashed_at_most(0.1)
     with pytest.raises(AssertionError, match="the same in all repetitions, 1 repetition"):
         result.assert_at_most(name, 0.9)
+    with pytest.raises(AssertionError, match="not judged whether at most 0.*, it is asked once"):
+        result.assert_at_most("ram_peak", 0.0)
 
 
 def test_strict_fails_what_is_not_decided() -> None:
