@@ -118,7 +118,7 @@ def _paragraphs(
     """Of each simulator what it is, where it is and what it can; of all the table of capabilities
     too, and the reasons of those whose adapter is broken."""
     if not names:
-        width = shutil.get_terminal_size((160, 24)).columns
+        width = shutil.get_terminal_size((100, 24)).columns
         yield render(columns(), width)
         yield ""
     for name in names or known():

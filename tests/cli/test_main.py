@@ -150,7 +150,9 @@ def test_one_simulator_is_told_whole(
     assert "deviates" in said(capsys, "list", "-v", "mujoco")[1]
     everything = said(capsys, "list", "-v")[1]
     assert all(f"\n{name}: {adapter(name).info.title}" in everything for name in registered())
-    assert "deterministic" in everything.partition("\ndart: ")[0]  # the table of capabilities
+    capabilities = everything.partition("\n\ncoppeliasim: ")[0]
+    assert "deterministic" in capabilities
+    assert max(map(len, capabilities.splitlines())) <= 100  # where no terminal says its width
 
 
 def test_robots_and_their_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
