@@ -119,7 +119,7 @@ def folder() -> Path:
     keep(path, "scene.xml", account)
     for line in (LINE, REPLAY):
         repeatability.append(path, line)
-    write_outcome(path, RunOutcome(False, "before", compared()))
+    RunOutcome(False, "before", compared()).write(path)
     figure = Trace.of(scene(), motion(), [(0.0, "pick")])
     figure.write(path, f"traces/{file_stem_of(kept[0])}.npz")
     album = Album()

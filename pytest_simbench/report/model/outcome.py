@@ -14,7 +14,7 @@ from typing import Any
 from pytest_simbench.ground.files import FileError, read_file, read_json
 from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.records import checked
-from pytest_simbench.records.paths import FolderError, inside
+from pytest_simbench.records.paths import FolderError, inside, write_whole
 from pytest_simbench.records.record import Record
 
 NAME = "outcome.json"
@@ -49,15 +49,19 @@ class RunOutcome:
         """The comparison, if there is one."""
         return None if self.comparison is None else (self.baseline, self.comparison)
 
-    def to_json(self) -> str:
-        """What a run folder keeps of it."""
+    def write(self, folder: Path) -> None:
+        """Write it into a run folder.
+
+        Raises:
+            OSError: it cannot be written.
+        """
         found: dict[str, Any] = {"schema": SCHEMA, "passed": self.passed, "looks": self.looks}
         if self.comparison is not None:
             found["comparison"] = {"baseline": self.baseline, **asdict(self.comparison)}
             for change in _changes(found):
                 # In the limit's terms it may be without bounds: of a baseline of 0.
                 change["loss"] = str(change["loss"])
-        return json.dumps(found)
+        write_whole(folder, NAME, json.dumps(found).encode())
 
     @classmethod
     def read(cls, folder: Path) -> tuple[RunOutcome, str]:

@@ -32,13 +32,13 @@ def test_it_is_read_back(passed: bool | None, loss: float, tmp_path: Path) -> No
     first, *others = report.changes
     report = replace(report, changes=(replace(first, loss=loss), *others))
     outcome = RunOutcome(passed, "runs/before", report, looks=2)
-    write_outcome(tmp_path, outcome)
+    outcome.write(tmp_path)
     assert RunOutcome.read(tmp_path) == (outcome, "")
 
 
 def test_a_folder_without_one_says_nothing(tmp_path: Path) -> None:
     assert RunOutcome.read(tmp_path) == (RunOutcome(), "")
-    write_outcome(tmp_path, RunOutcome(True))
+    RunOutcome(True).write(tmp_path)
     assert RunOutcome.read(tmp_path) == (RunOutcome(True), "")
     assert RunOutcome(True).compared is None
 
@@ -46,7 +46,7 @@ def test_a_folder_without_one_says_nothing(tmp_path: Path) -> None:
 def spoilt(**changes: Any) -> str:
     """What is written of a comparison, with a part of its first change replaced."""
     with TemporaryDirectory() as folder:
-        write_outcome(Path(folder), RunOutcome(True, "b", compared()))
+        RunOutcome(True, "b", compared()).write(Path(folder))
         data = json.loads((Path(folder) / NAME).read_text())
     data["comparison"]["changes"][0].update(changes)
     return json.dumps(data)
@@ -76,7 +76,7 @@ def test_what_is_none_is_told(text: str, told: str, tmp_path: Path) -> None:
 
 def test_it_leads_nowhere_else(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
-    write_outcome(tmp_path, RunOutcome(True))
+    RunOutcome(True).write(tmp_path)
     (tmp_path / "run" / NAME).symlink_to(tmp_path / NAME)
     found, problem = RunOutcome.read(tmp_path / "run")
     assert found == RunOutcome()
@@ -84,7 +84,7 @@ def test_it_leads_nowhere_else(tmp_path: Path) -> None:
 
 
 def test_a_run_that_was_interrupted_before_anything_ended_was_not_looked_at(tmp_path: Path) -> None:
-    write_outcome(tmp_path, RunOutcome(None, "", None, looks=2))
+    RunOutcome(None, "", None, looks=2).write(tmp_path)
     interrupted, ended = record(repetition=1, status="interrupted"), record(repetition=2)
     assert looks_at(tmp_path, [interrupted], [ended]) == 2
     assert looks_at(tmp_path, [ended], [ended, record(repetition=3)]) == 3
