@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Mapping
-from contextlib import ExitStack, closing, suppress
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,10 @@ from pytest_simbench.client.errors import DisplayError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.handle import SimulatorHandle
+from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.records.repeatability import NAME, Kind, Line, append
+from pytest_simbench.records.series import short, step_text
 from pytest_simbench.repeatability import search, stability
 from pytest_simbench.repeatability.agreement import FOLDER, Sample
 from pytest_simbench.repeatability.episode import Episodes
@@ -55,10 +58,19 @@ def replayed(experiment: Experiment, displays: Displays, jobs: int, **options: A
             jobs=jobs,
             **options,
         )
-    with suppress(OSError):
-        label = f"{case.simulator} {case.mode} {case.profile}"
-        sample = Sample.of(result.first, label, episodes.task.name, case.seed)
-        sample.save(case.folder, f"{FOLDER}/{case.short_name}.npz")
+    task, label = episodes.task, f"{case.simulator} {case.mode} {case.profile}"
+    robot = case.robot.name if case.robot else ""
+    step = step_text(case.changes["timestep"]) if case.own_timestep else ""
+    sample = replace(
+        Sample.of(result.first, label, task.name, case.seed),
+        test=", ".join(filter(None, (short(case.function), case.variant, robot, step))),
+        parameters=json.dumps(task.parameters()),
+    )
+    name = file_name(short(case.test), case.test, task.name, sample.parameters)
+    try:
+        sample.save(case.folder, f"{FOLDER}/{name}.npz")
+    except OSError as error:  # a full disk hides no result
+        warnings.warn(f"{name}.npz is not compared with other simulators: {error}", stacklevel=2)
     _keep("replay", episodes, result.to_wire())
     return result
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from itertools import combinations, zip_longest
 from pathlib import Path
 
@@ -44,7 +44,8 @@ class Facts:
 
     Attributes:
         label: simulator, with mode and profile where a reader needs them.
-        task, seed: what was run; only equal ones are compared.
+        task, seed, test, parameters: what was run: of the test what its simulator does not change,
+            and of the task as JSON. Only equal ones are compared.
     """
 
     label: str
@@ -52,6 +53,14 @@ class Facts:
     seed: int
     bodies: Sequence[str]
     counts: Mapping[str, float | None]
+    test: str = field(default="", kw_only=True)
+    parameters: str = field(default="", kw_only=True)
+
+    @property
+    def what(self) -> tuple[str, str]:
+        """What was run, in words, and the parameters."""
+        told = (self.task, f"seed {self.seed}", self.test)
+        return ", ".join(filter(None, told)), self.parameters
 
 
 @dataclass(frozen=True)
@@ -162,6 +171,7 @@ class Agreement:
     """Two simulators and one seed.
 
     Attributes:
+        what: see `Facts`.
         partings: by distance [m]; None: they never differ so much.
         commands_part: simulated time of the first operation whose set points or duration differ
             [s]; None: all commands are the same.
@@ -169,6 +179,7 @@ class Agreement:
         same_outcome: whether the task's counts are the same.
     """
 
+    what: tuple[str, str]
     first: str
     second: str
     partings: Mapping[float, Parting | None]
@@ -189,6 +200,7 @@ def agreement(first: Sample, second: Sample) -> Agreement:
         return Parting(float(between.time[found[0]]), first.bodies[found[1]], (x, y, z))
 
     return Agreement(
+        first.what,
         first.label,
         second.label,
         {limit: parting(limit) for limit in LIMITS},
@@ -207,11 +219,11 @@ def _commands_part(first: Sample, second: Sample) -> float | None:
 
 
 def agreements(folder: Path) -> list[Agreement]:
-    """All pairs of what a run left in its folder, task by task and seed by seed."""
+    """All pairs of simulators that ran the same, of what a run left in its folder."""
     names = sorted(path.name for path in inside(folder, FOLDER).glob("*.npz"))
     samples = [Sample.load(inside(folder, f"{FOLDER}/{name}")) for name in names]
     return [
         agreement(a, b)
         for a, b in combinations(samples, 2)
-        if (a.task, a.seed, tuple(a.bodies)) == (b.task, b.seed, tuple(b.bodies))
+        if (a.what, tuple(a.bodies)) == (b.what, tuple(b.bodies)) and a.label != b.label
     ]

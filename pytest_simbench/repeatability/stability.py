@@ -143,6 +143,7 @@ class Sensitivity:
         until: by a moment's name the largest of that ratio until then, from the beginning of the
             world; None where the task never came to it.
         largest: of that ratio at any time.
+        course: every sample, times as those of `ratio`, and the ratio.
     """
 
     simulator: str
@@ -150,6 +151,7 @@ class Sensitivity:
     ratio: Mapping[float, float | None]
     largest: float
     until: Mapping[str, float | None] = field(default_factory=dict)
+    course: Sequence[tuple[float, float]] = ()
 
     @property
     def sentence(self) -> str:
@@ -174,7 +176,8 @@ class Sensitivity:
                 raise ValueError(f"no moment is named {until!r}; there are: {known}")
             judged, when = [self.until[until]], until
         else:
-            judged, when = [r for t, r in self.ratio.items() if t <= until], f"{until:g} s"
+            told = (*self.ratio.items(), *self.course)
+            judged, when = [r for t, r in told if t <= until + 1e-9], f"{until:g} s"
         found = [ratio for ratio in judged if ratio is not None]
         if not found:
             raise AssertionError(f"{self.simulator}: the task never came to {when}")
@@ -226,4 +229,5 @@ def sensitivity(
         {time: None if value is None else value / size for time, value in ratios.items()},
         float(gap.max()),
         until,
+        list(zip((between.time - began).tolist(), gap.tolist(), strict=True)),
     )

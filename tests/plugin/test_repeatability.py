@@ -49,7 +49,11 @@ def test_results_tables_and_files(pytester: pytest.Pytester, workers: tuple[str,
     assert all(line["versions"] for line in lines)
     text = result.stdout.str()
     assert text.count("= repeatability =") == 1
-    for part in ("Replay: tumbling, seed 10001", "topples tower 1", "Agreement"):
+    for part in (
+        "Replay: tumbling, seed 10001",
+        "topples tower 1",
+        "Agreement: tumbling, seed 10001, test_again",
+    ):
         assert part in text
     assert "# Repeatability" in (out / "repeatability.md").read_text()
 
@@ -76,7 +80,7 @@ def test_a_broken_claim_fails_the_test(
         [
             "*noisy claims to be deterministic, but*",
             "*after a reset: first differs at t = 0.02 s*",
-            "*Replay: tumbling, growth*",
+            "*Replay: tumbling, seed 10001, growth*",
         ]
     )
 

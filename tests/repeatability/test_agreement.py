@@ -28,6 +28,7 @@ def sample(label: str, times: Sequence[float], x: Sequence[float]) -> Sample:
 
 
 TIMES = (0.1, 0.2, 0.3, 0.4)
+WHAT = ("t, seed 1", "")
 
 
 def test_an_agreement_is_known_in_full() -> None:
@@ -36,10 +37,10 @@ def test_an_agreement_is_known_in_full() -> None:
     second = replace(sample("b", TIMES, [0.2, 0.2005, 0.2015, 0.25]), counts={"n": 0.5})
     place = (0.2, 0.0, 0.0)
     partings = {0.001: Parting(0.3, "moving", place), 0.01: Parting(0.4, "moving", place)}
-    assert agreement(first, second) == Agreement("a", "b", partings, None, 0.4, False)
+    assert agreement(first, second) == Agreement(WHAT, "a", "b", partings, None, 0.4, False)
     assert str(partings[0.01]) == "0.40 s, moving at (0.20, 0.00, 0.00)"
     near = sample("b", TIMES, [0.2009] * 4)
-    never = Agreement("a", "b", {0.001: None, 0.01: None}, None, 0.4, True)
+    never = Agreement(WHAT, "a", "b", {0.001: None, 0.01: None}, None, 0.4, True)
     assert agreement(first, near) == never
 
 
@@ -93,8 +94,11 @@ def test_partings_are_told_by_the_first_one_s_time() -> None:
 
 def test_kept_and_read_back(tmp_path: Path) -> None:
     """Only what is of the same task, seed and scene is compared."""
-    others = {"c": {"seed": 2}, "d": {"task": "u"}, "e": {"bodies": ["moving", "other"]}}
-    for name in "abdec":
+    others = {
+        "c": {"seed": 2}, "d": {"task": "u"}, "e": {"bodies": ["moving", "other"]},
+        "f": {"test": "test_other"}, "g": {"parameters": '{"task.n": 2}'}, "h": {"label": "a"},
+    }  # fmt: skip
+    for name in "abdefghc":
         kept = replace(
             sample(name, TIMES, [0.2] * 4),
             asked=np.array([[0.2, np.nan, np.nan], [0.2, 1.0, 2.0]]),
@@ -106,7 +110,8 @@ def test_kept_and_read_back(tmp_path: Path) -> None:
     assert read.counts == {"n": 1.0}
     assert np.array_equal(read.asked, kept.asked, equal_nan=True)
     assert [len(motion) for motion in read.motions] == [1, 4]
-    assert [(a.first, a.second) for a in agreements(tmp_path)] == [("a", "b")]
+    pairs = [(a.first, a.second) for a in agreements(tmp_path)]
+    assert pairs == [("a", "b"), ("b", "a")]
     assert agreements(tmp_path / "nothing") == []
 
 

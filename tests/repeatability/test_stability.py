@@ -95,6 +95,21 @@ def test_only_what_comes_before_is_judged() -> None:
         Sensitivity("sim", "it", {}, 9.0).assert_below(9.0, until="c")
 
 
+def test_a_peak_between_the_times_that_are_told_is_judged() -> None:
+    """Growth is told at 1 s and 5 s; 1000 mm per mm at 2 s passed as "below 10 until 3 s"."""
+
+    def run(perturbed: Perturbed) -> Episode:
+        off = sum(p.amount for p in perturbed)
+        ways = [off, off, 1000 * off, off]
+        motions = [motion([0.0], [off], [0.5]), motion([0.5, 1.0, 2.0, 4.0], ways, [0.5] * 4)]
+        return episode(ALL, motions, [operation("wait", "fall", 4.0)])
+
+    found = sensitivity(Scripted(run), Perturbation("x", 1, "a"))
+    found.assert_below(10.0, until=1.5)
+    with pytest.raises(AssertionError, match=r"most 1000; expected below 10 until 3 s$"):
+        found.assert_below(10.0, until=3.0)
+
+
 def test_no_growth_is_told_of_what_is_no_displacement() -> None:
     experiment = Scripted(growing)
     with pytest.raises(ValueError, match="^sensitivity is told per millimetre, not for 1 deg of"):

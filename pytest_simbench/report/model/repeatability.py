@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.repeatability import GROWTH_TIMES, Again, Line, read
+from pytest_simbench.records.series import short
 from pytest_simbench.repeatability.agreement import LIMITS, Agreement, agreements
 from pytest_simbench.report.model.document import Column, Table
 
@@ -38,28 +39,44 @@ def tables(lines: Sequence[Line], agreements: Sequence[Agreement]) -> list[Table
     """All tables that there is something to tell in."""
     replays = [line for line in lines if line.kind == "replay"]
     found: list[Table] = []
-    for task in dict.fromkeys(line.task for line in replays):
-        ours = [line for line in replays if line.task == task]
-        seeds = ", ".join(str(seed) for seed in dict.fromkeys(line.seed for line in ours))
-        found.append(Table(f"Replay: {task}, seed {seeds}", replay_columns(ours), REPLAY))
-        parted = [(line, again) for line in ours for again in line.again if again.first is not None]
+    for task, seed in dict.fromkeys((line.task, line.seed) for line in replays):
+        ours = [line for line in replays if (line.task, line.seed) == (task, seed)]
+        title, names = f"Replay: {task}, seed {seed}", _names(ours)
+        found.append(Table(title, replay_columns(ours, names), REPLAY))
+        parted = [
+            (f"{name}, {again.way}", again)
+            for line, name in zip(ours, names, strict=True)
+            for again in line.again
+            if again.first is not None
+        ]
         if parted:
-            found.append(Table(f"Replay: {task}, growth", growth_columns(parted), GROWTH))
+            found.append(Table(f"{title}, growth", growth_columns(parted), GROWTH))
     others = [line for line in lines if line.kind != "replay"]
     if others:
         found.append(Table("Perturbation", sentence_columns(others), PERTURBATION))
-    if agreements:
-        found.append(Table("Agreement", matrix_columns(agreements), AGREEMENT))
-        found.append(Table("Agreement, in detail", detail_columns(agreements)))
+    for what in dict.fromkeys(pair.what for pair in agreements):
+        same = [pair for pair in agreements if pair.what == what]
+        title = f"Agreement: {what[0]}"
+        found.append(Table(title, matrix_columns(same), AGREEMENT))
+        found.append(Table(f"{title}, in detail", detail_columns(same)))
     return found
 
 
-def replay_columns(lines: Sequence[Line]) -> list[Column]:
+def _names(lines: Sequence[Line]) -> list[str]:
+    """The label of each; with its test where several tests have that label."""
+    labels = [line.label for line in lines]
+    return [
+        label if labels.count(label) == 1 else f"{label}, {short(line.test)}"
+        for label, line in zip(labels, lines, strict=True)
+    ]
+
+
+def replay_columns(lines: Sequence[Line], names: Sequence[str]) -> list[Column]:
     """A row for each simulator, a column for each way of running again."""
     told = [{again.way: again for again in line.again} for line in lines]
     claims = ["yes" if line.result["claims"] else "no" for line in lines]
     return [
-        Column("simulator", [line.label for line in lines], left=True),
+        Column("simulator", names, left=True),
         Column("claims to repeat", claims),
         *(
             Column(way, [_cell(found[way]) if way in found else "" for found in told])
@@ -76,7 +93,7 @@ def _cell(again: Again) -> str:
     return "same" if again.first is None else f"{again.first:.2f} s"
 
 
-def growth_columns(parted: Sequence[tuple[Line, Again]]) -> list[Column]:
+def growth_columns(parted: Sequence[tuple[str, Again]]) -> list[Column]:
     """A row for each way in which a simulator did not repeat itself."""
     agains = [again for _, again in parted]
 
@@ -84,7 +101,7 @@ def growth_columns(parted: Sequence[tuple[Line, Again]]) -> list[Column]:
         return "" if size is None else significant(1000 * size)
 
     return [
-        Column("simulator", [f"{line.label}, {again.way}" for line, again in parted], left=True),
+        Column("simulator", [name for name, _ in parted], left=True),
         Column("first at s", [f"{again.first:.2f}" for again in agains]),
         Column("cube", [again.body or "(robot)" for again in agains], left=True),
         *(

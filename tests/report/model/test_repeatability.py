@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pytest_simbench.records.repeatability import Again, Line
@@ -32,6 +34,7 @@ LINES = [
 ]
 AGREEMENTS = [
     Agreement(
+        ("throwing, seed 7, test_x", ""),
         "mujoco headless tuned",
         "wobbly headless tuned",
         {0.001: Parting(0.5, "cube_1", (0.1, 0.2, 0.3)), 0.01: None},
@@ -76,6 +79,33 @@ def test_the_row_says_it_all() -> None:
 def test_no_table_without_content() -> None:
     assert tables([], []) == []
     assert [table.title for table in tables(LINES[:1], [])] == ["Replay: throwing, seed 7"]
+
+
+def test_each_test_and_seed_has_tables_of_its_own() -> None:
+    """One test's difference stood where the last one's was: a throw that parts was "never"."""
+    never = replace(AGREEMENTS[0], partings={0.001: None, 0.01: None})
+    others = [("throwing, seed 7, test_x", "{}"), ("throwing, seed 8, test_x", "")]
+    found = tables([], [*AGREEMENTS, *(replace(never, what=what) for what in others)])
+    titles = [f"Agreement: {words}" for words, _ in (AGREEMENTS[0].what, *others)]
+    assert [table.title for table in found[::2]] == titles
+    cells = [table.columns[2].cells[0].lines[0] for table in found[::2]]
+    assert cells == ["0.50 s / never", "never / never", "never / never"]
+
+
+def test_a_simulator_of_several_tests_or_seeds_is_told_apart() -> None:
+    again = [Again(way="fresh process", first=1.0, body="a", growth={}, largest=0.1).to_wire()]
+    ours = line("replay", "mujoco", claims=True, again=again)
+    found = tables([ours, replace(ours, test="t::y"), replace(ours, seed=8)], [])
+    assert [table.title for table in found] == [
+        "Replay: throwing, seed 7", "Replay: throwing, seed 7, growth",
+        "Replay: throwing, seed 8", "Replay: throwing, seed 8, growth",
+    ]  # fmt: skip
+    name = "mujoco headless tuned"
+    assert [cell.lines[0] for cell in found[0].columns[0].cells] == [f"{name}, x", f"{name}, y"]
+    assert [cell.lines[0] for cell in found[1].columns[0].cells] == [
+        f"{name}, {test}, fresh process" for test in "xy"
+    ]
+    assert [cell.lines[0] for cell in found[2].columns[0].cells] == [name]
 
 
 def test_markdown() -> None:
