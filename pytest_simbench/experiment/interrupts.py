@@ -30,6 +30,10 @@ class Interrupts:
         """From here on nothing interrupts until the block ends."""
         self._held = True
 
+    def forget(self) -> None:
+        """What came since `hold` is not handled."""
+        self._waiting.clear()
+
     def __enter__(self) -> Interrupts:
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:

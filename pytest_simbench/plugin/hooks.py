@@ -3,6 +3,7 @@ every pytest run where the package is installed, so it stays light."""
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Generator
 from typing import Any
@@ -86,4 +87,38 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     """So is one that asks for it later; one whose repetitions crashed fails."""
     found = yield from pytest_runtest_setup()
     item.stash.get(REPEATED, lambda: None)()
+    return found
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_keyboard_interrupt() -> Generator[None, Any, Any]:
+    """A second Ctrl-C while pytest lists the calls of the first, which takes it a second, is the
+    same wish: it would end pytest with its own traceback."""
+    from pytest_simbench.experiment.interrupts import Interrupts
+
+    with Interrupts() as interrupts:
+        interrupts.hold()
+        found = yield
+        interrupts.forget()
+    return found
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)  # around the summary and the last teardown, too
+def pytest_sessionfinish(session: pytest.Session) -> Generator[None, Any, Any]:
+    """Ctrl-C ends what is left to do with one sentence; a file that was asked for and could not be
+    written fails the run."""
+    ours = session_of(session.config)
+    try:
+        found = yield
+    except KeyboardInterrupt:
+        if not ours.begun or ours.in_worker:
+            raise
+        folder = ours.run.folder.path
+        pytest.exit(
+            f"interrupted while the report was made; the records are kept in {folder}, and "
+            f"simbench report {shlex.quote(str(folder))} makes the report",
+            returncode=pytest.ExitCode.INTERRUPTED,
+        )
+    if ours.begun and ours.run.unwritten and session.exitstatus == pytest.ExitCode.OK:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
     return found

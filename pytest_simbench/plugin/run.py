@@ -53,6 +53,7 @@ class Run:
         resumed: the interrupted run that this one completes, if it does.
         failing: whether a test of the resumed run that did not run again had failed.
         page: to look at, once the whole report is written.
+        unwritten: whether a file, the badge among them, could not be written.
         expected: what later tests will ask for; set before the first one asks.
     """
 
@@ -67,6 +68,7 @@ class Run:
         self.mistake = ""
         self.failing = False
         self.page: Path | None = None
+        self.unwritten = False
         self.expected: Callable[[], Iterable[Experiment]] = tuple
         self._attempts: Counter[tuple[str, str, str]] = Counter()
         self._lock = threading.Lock()
@@ -319,10 +321,11 @@ class Run:
         baseline, report = found or ("", None)
         passed = passed and not self.failing
         outcome = RunOutcome(passed, baseline, report, looks)
-        problems.append(write_outcome(path, outcome))
+        lost = [write_outcome(path, outcome)]
         if badge := options.value(self.config, "sim_badge"):
-            problems.append(write_badge(Path(badge), records, passed))
-        problems += recorded
+            lost.append(write_badge(Path(badge), records, passed))
+        self.unwritten = not written.complete or bool(unsaved) or any(lost)
+        problems += [*lost, *recorded]
         if written.complete and not unsaved:
             self.page = path / PAGE_NAME
         else:

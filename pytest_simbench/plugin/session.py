@@ -5,9 +5,7 @@ Imported at plugin load: standard library and pytest only; everything else is im
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Callable, Collection, Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Generator
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -222,43 +220,27 @@ class SimSession:
         elif report.skipped and hasattr(report, "wasxfail"):
             self._xfailed.add(report.nodeid)
 
-    @contextmanager
-    def _interruptible(self) -> Iterator[None]:
-        """While results are put together: Ctrl-C ends that with one sentence."""
-        try:
-            yield
-        except KeyboardInterrupt:
-            if not self.begun or self.in_worker:
-                raise
-            folder = self.run.folder.path
-            pytest.exit(
-                f"interrupted while the report was made; the records are kept in {folder}, and "
-                f"simbench report {shlex.quote(str(folder))} makes the report",
-                returncode=pytest.ExitCode.INTERRUPTED,
-            )
-
     @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Compare with the baseline; a metric that is worse than allowed fails the run, and so do
         a limit that compared nothing and a threshold of a metric that no test has."""
-        with self._interruptible():
-            if self._received:
-                self.run.receive(self._received)
-            if self.in_worker:
-                return
-            if self.begun:
-                self.run.judge(self._failed, self._passed, self._xfailed)
-                self.run.complete()
-            if self.comparison is not None and self._alone:
-                from pytest_simbench.records.folder import RunContents
+        if self._received:
+            self.run.receive(self._received)
+        if self.in_worker:
+            return
+        if self.begun:
+            self.run.judge(self._failed, self._passed, self._xfailed)
+            self.run.complete()
+        if self.comparison is not None and self._alone:
+            from pytest_simbench.records.folder import RunContents
 
-                reading = self.run.reading if self.begun else RunContents()
-                if reading.records or self.comparison.typed:
-                    self.comparison.make(reading)
-                if self.comparison.failed and session.exitstatus == pytest.ExitCode.OK:
-                    session.exitstatus = pytest.ExitCode.TESTS_FAILED
-            if self.begun:
-                self.run.check_thresholds(session)
+            reading = self.run.reading if self.begun else RunContents()
+            if reading.records or self.comparison.typed:
+                self.comparison.make(reading)
+            if self.comparison.failed and session.exitstatus == pytest.ExitCode.OK:
+                session.exitstatus = pytest.ExitCode.TESTS_FAILED
+        if self.begun:
+            self.run.check_thresholds(session)
 
     @pytest.hookimpl(optionalhook=True, wrapper=True)
     def pytest_benchmark_group_stats(self) -> Generator[None, Any, Any]:
@@ -276,25 +258,24 @@ class SimSession:
         reporter = terminalreporter
         if self.in_worker:  # an xdist worker has a reporter too, which nobody reads
             return
-        with self._interruptible():
-            if self.begun:
-                if exitstatus == pytest.ExitCode.INTERRUPTED:
-                    self.run.tell_how_to_go_on()
-                self.run.summarise(reporter, self.comparison, exitstatus == pytest.ExitCode.OK)
-            if self.comparison:
-                reporter.write_sep("=", "comparison with the baseline")
-                reporter.write_line(self.comparison.text(reporter._tw.fullwidth))
-            if self.begun or self.config.pluginmanager.has_plugin("dsession"):
-                from pytest_simbench.records.repeatability import NAME
+        if self.begun:
+            if exitstatus == pytest.ExitCode.INTERRUPTED:
+                self.run.tell_how_to_go_on()
+            self.run.summarise(reporter, self.comparison, exitstatus == pytest.ExitCode.OK)
+        if self.comparison:
+            reporter.write_sep("=", "comparison with the baseline")
+            reporter.write_line(self.comparison.text(reporter._tw.fullwidth))
+        if self.begun or self.config.pluginmanager.has_plugin("dsession"):
+            from pytest_simbench.records.repeatability import NAME
 
-                if (self.run.folder.path / NAME).is_file():
-                    from pytest_simbench.plugin.repeatability import summarise
+            if (self.run.folder.path / NAME).is_file():
+                from pytest_simbench.plugin.repeatability import summarise
 
-                    summarise(reporter, self.run.folder.path)
-            if self.begun and self.run.page is not None:
-                from pytest_simbench.report.files import where
+                summarise(reporter, self.run.folder.path)
+        if self.begun and self.run.page is not None:
+            from pytest_simbench.report.files import where
 
-                reporter.write_line(where(self.run.page, self.config.invocation_params.dir))
+            reporter.write_line(where(self.run.page, self.config.invocation_params.dir))
 
     def pytest_unconfigure(self) -> None:
         """End what the run started."""

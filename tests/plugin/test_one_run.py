@@ -165,6 +165,7 @@ def test_what_could_not_be_written_is_said_and_not_shown_as_there(
     folder = pytester.mkdir("o")
     (folder / "report.md").mkdir()
     result = run(pytester, "--sim-output=o", passed=1)
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
     result.stdout.fnmatch_lines(["*o/report.md could not be written (Is a directory)"])
     assert "report: " not in result.stdout.str()
     assert (folder / "report.html").is_file()

@@ -70,6 +70,7 @@ def test_everything_is_told_with_v_and_a_badge_that_cannot_be_written(
     pytester.mkdir("badge.json")
     result = run(pytester, "-v", "--sim-badge=badge.json", passed=1)
     result.stdout.fnmatch_lines(["no badge: *badge.json could not be written (*"])
+    assert result.ret == pytest.ExitCode.TESTS_FAILED
     output = result.stdout.str()
     assert "where the time went" in output
     assert "declared deviations from the scene" in output
