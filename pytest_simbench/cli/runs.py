@@ -132,9 +132,9 @@ def merge_runs(
         if any(reading.claims for reading in readings.values()):
             problems.append(f"pytest --sim-resume={folder.path} judges the claims of the whole")
         written = _show(folder.read(), outcome, folder.path, folder.path, verbose, problems, **more)
-        if written.complete and not unsaved:
+        if complete := written.complete and not unsaved:
             print(where(folder.path / PAGE_NAME, Path.cwd()))
-    return 0
+    return 0 if complete else 1
 
 
 def report_runs(
@@ -216,8 +216,9 @@ def _show(
     report = Report.of(reading, outcome.compared, outcome.looks)
     written = Written(**vars(report)) if target is None else write_files(target, report, run)
     problems += written.problems
-    if badge:
-        problems.append(write_badge(Path(badge), reading.records, outcome.passed))
+    if badge and (lost := write_badge(Path(badge), reading.records, outcome.passed)):
+        problems.append(lost)
+        written = replace(written, complete=False)
     if record and run is not None and target is not None:
         problems += recordings(run, target, reading.records)
     elif record:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.cli.runs import merge_runs
+from pytest_simbench.cli.runs import merge_runs, report_runs
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.folder import RunFolder
@@ -134,6 +134,13 @@ def test_damaged_lines_are_told_and_the_rest_is_joined(
         file.write(b"\0" * 500)
     assert merge("a") == 0
     assert "records.jsonl:2: the line is damaged and left out" in capsys.readouterr().out
+
+
+def test_a_badge_that_cannot_be_written_ends_badly(here: Path) -> None:
+    saved(here / "a", 1, "")
+    assert merge_runs(["a"], output="whole", badge=".") == 1
+    assert report_runs(["a"], badge=".") == 1
+    assert report_runs(["a"], badge="badge.json") == 0
 
 
 def test_the_same_run_by_another_name_is_given_twice(here: Path) -> None:
