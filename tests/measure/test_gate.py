@@ -194,17 +194,24 @@ def test_a_limit_that_compares_nothing_fails_and_says_why() -> None:
     assert run_gate(here, [], (), {}, typed=False).failures == ()
 
 
-def test_a_value_that_one_test_has_lost_fails_a_typed_limit() -> None:
+@pytest.mark.parametrize(
+    ("left", "why"),
+    [
+        (0, "no repetition of this run has a value"),
+        (2, "2 of 6 repetitions of this run have a value, and a change takes 5 pairs or more"),
+    ],
+)
+def test_a_value_that_one_test_has_lost_fails_a_typed_limit(left: int, why: str) -> None:
     """The limit is compared in another test: the run passed, with a note."""
     values = {"placed": 1.0, "landing_error": 0.1}
     here = [record(k, metrics=values) for k in range(6)]
     other = [replace(r, test="test_other[engine-headless]", function="test_other") for r in here]
-    lost = [replace(r, metrics={"placed": 1.0}) for r in other]
+    lost = other[:left] + [replace(r, metrics={"placed": 1.0}) for r in other[left:]]
     limits = parse_limits("landing_error:1", METRICS)
     for typed in (True, False):
         sides = [*here, *other], [*here, *lost]
         report = run_gate(*sides, limits, {"stacking": METRICS}, typed=typed)
-        told = "test_other[engine-headless]: landing_error:1 is not tested: no repetition of this "
+        told = f"test_other[engine-headless]: landing_error:1 is not tested: {why}"
         assert [t for t in report.failures if t.startswith(told)] == [*report.failures]
         assert bool(report.failures) is typed
         assert any(t.startswith(told) for t in (*report.failures, *report.notes))
