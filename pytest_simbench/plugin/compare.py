@@ -11,7 +11,7 @@ import pytest
 
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.ground.versions import base_name
-from pytest_simbench.measure.gate import GateReport, gate_runs, side_by_side
+from pytest_simbench.measure.gate import gate_runs, side_by_side
 from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
 from pytest_simbench.plugin import options
 from pytest_simbench.records.baseline import FORMS, BaselineError, from_benchmarks, read_baseline
@@ -19,6 +19,7 @@ from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric, UnknownMetric
 from pytest_simbench.report.markdown.run import render_section
 from pytest_simbench.report.model import changes
+from pytest_simbench.report.model.outcome import Compared
 from pytest_simbench.report.terminal.parts import render_changes as render_terminal
 
 Beside = tuple[str, Sequence[str]]
@@ -34,13 +35,14 @@ class Comparison:
         limits: how much worse each metric may get; without any, crashes alone can fail the run.
         typed: whether the limits are for this very run: one that compares nothing fails it.
         beside: a simulator of this very run, and its other versions, that are compared with it.
+        found: name of the baseline and what differs from it; None when nothing was compared.
     """
 
     baseline: RunContents
     limits: Sequence[Limit] = ()
     beside: Beside | None = None
     typed: bool = False
-    _report: GateReport | None = field(default=None, init=False)
+    found: Compared | None = field(default=None, init=False)
 
     def make(self, run: RunContents) -> None:
         """Compare with this run, which says what the metrics mean."""
@@ -48,33 +50,29 @@ class Comparison:
         if self.beside is not None:
             before, now = side_by_side(run.records, *self.beside)
             baseline, run = replace(baseline, records=before), replace(run, records=now)
-        self._report = gate_runs(baseline, run, self.limits, typed=self.typed)
+        found = gate_runs(baseline, run, self.limits, typed=self.typed)
+        self.found = baseline.name, found
 
     @property
     def failed(self) -> bool:
         """Whether a limit was exceeded or compared nothing, more repetitions crashed, or a test
         gives nothing any more."""
-        return bool(self._report and self._report.failures)
-
-    @property
-    def found(self) -> tuple[str, GateReport] | None:
-        """Name of the baseline and what differs from it; None when nothing was compared."""
-        return None if self._report is None else (self.baseline.name, self._report)
+        return self.found is not None and bool(self.found[1].failures)
 
     def text(self, width: int) -> str:
         """For the terminal."""
         parts = [f"baseline: {self.baseline.name}", *self.baseline.problems]
-        if self._report is None:
+        if self.found is None:
             parts.append("nothing was compared: no repetition was recorded")
         else:
-            parts.append(render_terminal(self._report, width, bool(self.limits)))
+            parts.append(render_terminal(self.found[1], width, bool(self.limits)))
         return for_terminal("\n".join(parts))
 
     def markdown(self) -> str:
         """For the page of a CI job."""
-        if self._report is None:
+        if self.found is None:
             return ""
-        told = changes.section(self.baseline.name, self._report, bool(self.limits))
+        told = changes.section(*self.found, bool(self.limits))
         return render_section(told) + "\n"
 
 

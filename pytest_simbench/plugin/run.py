@@ -318,10 +318,8 @@ class Run:
         for title, text in runs.sections(written, reporter._tw.fullwidth, verbose):
             reporter.write_sep("=", title)
             reporter.write_line(text)
-        baseline, report = found or ("", None)
         passed = passed and not self.failing
-        outcome = RunOutcome(passed, baseline, report, looks)
-        lost = [write_outcome(path, outcome)]
+        lost = [write_outcome(path, RunOutcome(passed, found, looks))]
         if badge := options.value(self.config, "sim_badge"):
             lost.append(write_badge(Path(badge), records, passed))
         self.unwritten = not written.complete or bool(unsaved) or any(lost)

@@ -148,11 +148,7 @@ def shown(path: Path, base: Path) -> Path:
 
 def write_outcome(folder: Path, outcome: RunOutcome) -> str:
     """Keep how a run ended in its folder; a sentence when it could not be written."""
-    try:
-        outcome.write(folder)
-    except OSError as error:
-        return _unwritable(folder / OUTCOME, error)
-    return ""
+    return _written(folder, OUTCOME, outcome.to_json())
 
 
 def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> str:

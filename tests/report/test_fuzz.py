@@ -47,7 +47,7 @@ from pytest_simbench.records.record import Failure, RecordError
 from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.repeatability.agreement import FOLDER as SAMPLES
 from pytest_simbench.report.figures.sheet import albums
-from pytest_simbench.report.files import write_files, write_tables
+from pytest_simbench.report.files import write_files, write_outcome, write_tables
 from pytest_simbench.report.model.outcome import NAME as OUTCOME
 from pytest_simbench.report.model.outcome import RunOutcome
 from pytest_simbench.report.model.report import Report
@@ -119,7 +119,7 @@ def folder() -> Path:
     keep(path, "scene.xml", account)
     for line in (LINE, REPLAY):
         repeatability.append(path, line)
-    RunOutcome(False, "before", compared()).write(path)
+    write_outcome(path, RunOutcome(False, ("before", compared())))
     figure = Trace.of(scene(), motion(), [(0.0, "pick")])
     figure.write(path, f"traces/{file_stem_of(kept[0])}.npz")
     album = Album()

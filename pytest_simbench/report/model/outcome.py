@@ -14,7 +14,7 @@ from typing import Any
 from pytest_simbench.ground.files import FileError, read_file, read_json
 from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.records import checked
-from pytest_simbench.records.paths import FolderError, inside, write_whole
+from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record
 
 NAME = "outcome.json"
@@ -34,34 +34,24 @@ class RunOutcome:
 
     Attributes:
         passed: whether the tests, and the limits against the baseline, passed; None: not known.
-        baseline: name of what it was compared with.
-        comparison: what differs from it; None when nothing was compared.
+        compared: with what, and what differs from it; None when nothing was compared.
         looks: how often the run was gone on with and judged again, with the first time.
     """
 
     passed: bool | None = None
-    baseline: str = ""
-    comparison: GateReport | None = None
+    compared: Compared | None = None
     looks: int = 1
 
-    @property
-    def compared(self) -> Compared | None:
-        """The comparison, if there is one."""
-        return None if self.comparison is None else (self.baseline, self.comparison)
-
-    def write(self, folder: Path) -> None:
-        """Write it into a run folder.
-
-        Raises:
-            OSError: it cannot be written.
-        """
+    def to_json(self) -> str:
+        """What a run folder keeps of it."""
         found: dict[str, Any] = {"schema": SCHEMA, "passed": self.passed, "looks": self.looks}
-        if self.comparison is not None:
-            found["comparison"] = {"baseline": self.baseline, **asdict(self.comparison)}
+        if self.compared is not None:
+            baseline, report = self.compared
+            found["comparison"] = {"baseline": baseline, **asdict(report)}
             for change in _changes(found):
                 # In the limit's terms it may be without bounds: of a baseline of 0.
                 change["loss"] = str(change["loss"])
-        write_whole(folder, NAME, json.dumps(found).encode())
+        return json.dumps(found)
 
     @classmethod
     def read(cls, folder: Path) -> tuple[RunOutcome, str]:
@@ -77,9 +67,9 @@ class RunOutcome:
             checked.schema(data, SCHEMA)
             for change in _changes(data):
                 change["loss"] = float(change["loss"])
-            comparison = data.get("comparison") or {}
-            whole = {"baseline": comparison.pop("baseline", ""), "comparison": comparison or None}
-            whole |= {"passed": data.get("passed"), "looks": data.get("looks", 1)}
+            whole = {"passed": data.get("passed"), "looks": data.get("looks", 1)}
+            if comparison := data.get("comparison"):
+                whole["compared"] = comparison.pop("baseline", ""), comparison
             return checked.convert(whole, cls), ""
         except (FolderError, FileError) as error:
             return cls(), str(error)

@@ -13,6 +13,7 @@ import pytest
 
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import Limit
+from pytest_simbench.report.files import write_outcome
 from pytest_simbench.report.model.outcome import NAME, RunOutcome, looks_at
 from tests.report.samples import METRICS, record
 
@@ -31,14 +32,14 @@ def test_it_is_read_back(passed: bool | None, loss: float, tmp_path: Path) -> No
     assert report.differences
     first, *others = report.changes
     report = replace(report, changes=(replace(first, loss=loss), *others))
-    outcome = RunOutcome(passed, "runs/before", report, looks=2)
-    outcome.write(tmp_path)
+    outcome = RunOutcome(passed, ("runs/before", report), looks=2)
+    write_outcome(tmp_path, outcome)
     assert RunOutcome.read(tmp_path) == (outcome, "")
 
 
 def test_a_folder_without_one_says_nothing(tmp_path: Path) -> None:
     assert RunOutcome.read(tmp_path) == (RunOutcome(), "")
-    RunOutcome(True).write(tmp_path)
+    write_outcome(tmp_path, RunOutcome(True))
     assert RunOutcome.read(tmp_path) == (RunOutcome(True), "")
     assert RunOutcome(True).compared is None
 
@@ -46,7 +47,7 @@ def test_a_folder_without_one_says_nothing(tmp_path: Path) -> None:
 def spoilt(**changes: Any) -> str:
     """What is written of a comparison, with a part of its first change replaced."""
     with TemporaryDirectory() as folder:
-        RunOutcome(True, "b", compared()).write(Path(folder))
+        write_outcome(Path(folder), RunOutcome(True, ("b", compared())))
         data = json.loads((Path(folder) / NAME).read_text())
     data["comparison"]["changes"][0].update(changes)
     return json.dumps(data)
@@ -76,7 +77,7 @@ def test_what_is_none_is_told(text: str, told: str, tmp_path: Path) -> None:
 
 def test_it_leads_nowhere_else(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
-    RunOutcome(True).write(tmp_path)
+    write_outcome(tmp_path, RunOutcome(True))
     (tmp_path / "run" / NAME).symlink_to(tmp_path / NAME)
     found, problem = RunOutcome.read(tmp_path / "run")
     assert found == RunOutcome()
@@ -84,7 +85,7 @@ def test_it_leads_nowhere_else(tmp_path: Path) -> None:
 
 
 def test_a_run_that_was_interrupted_before_anything_ended_was_not_looked_at(tmp_path: Path) -> None:
-    RunOutcome(None, "", None, looks=2).write(tmp_path)
+    write_outcome(tmp_path, RunOutcome(looks=2))
     interrupted, ended = record(repetition=1, status="interrupted"), record(repetition=2)
     assert looks_at(tmp_path, [interrupted], [ended]) == 2
     assert looks_at(tmp_path, [ended], [ended, record(repetition=3)]) == 3
