@@ -20,8 +20,6 @@ from pytest_simbench.simulator.settings import Settings, in_words, meanings, sea
 Missing = Callable[[str], str | None]
 """Why a simulator whose adapter is fine cannot run, with what mends it; None when it can."""
 
-HEADINGS = ("simulator", "version", "ready", "tuned", "real", "step")
-
 
 def list_simulators(
     names: Sequence[str] = (),
@@ -72,7 +70,7 @@ def _missing(cluster: str | None, builds: dict[str, str]) -> Missing:
 
 def _table(missing: Missing) -> Iterator[str]:
     """A line for each simulator; one that is not ready says how to learn more."""
-    rows: list[tuple[str, ...]] = [HEADINGS]
+    rows: list[tuple[str, ...]] = [("simulator", "version", "ready", "tuned", "real", "step")]
     for name in known():
         if broken := problem(name):
             rows.append((name, "-", f"BROKEN: {broken}"))

@@ -189,7 +189,7 @@ def run_gate(
         else:
             apart = {test: why for test, why in reasons.items() if why != UNKNOWN}
             for test, why in apart.items():
-                lost = typed and isinstance(why, Lost) and after[test].ok
+                lost = typed and why.endswith((GONE, FEW)) and after[test].ok
                 (broken if lost else notes).append(f"{test}: {limit} is not tested: {why}")
     number = max(1, sum(change.by_chance for change in changes))
     notes += [
@@ -304,10 +304,7 @@ NO_MORE = Limit(CRASHED.name, 0.0, True)
 UNKNOWN, GONE = "it is not measured there", "no repetition of this run has a value"
 PAIRS = math.ceil(math.log2(1 / ALPHA))
 """With fewer no change is significant, however large: 5."""
-
-
-class Lost(str):
-    """Why there is no change of a metric: its values are gone, which the baseline has."""
+FEW = f"and a change takes {PAIRS} pairs or more"
 
 
 def _change(
@@ -315,8 +312,7 @@ def _change(
 ) -> Change | str:
     """The change of one metric, not yet corrected; else why there is none."""
     if not (limit.metric in old.known and limit.metric in new.known):
-        before = any(limit.metric in record.metrics for record in old.ok)
-        return Lost(GONE) if before else UNKNOWN
+        return GONE if any(limit.metric in record.metrics for record in old.ok) else UNKNOWN
     metric = new.metric(limit.metric)
     if metric.better is None:
         return "neither direction of it is worse"
@@ -328,13 +324,12 @@ def _change(
     if not old.values(metric):
         return "no repetition of the baseline has a value"
     if not new.values(metric):
-        return Lost(GONE)
+        return GONE
     comparison, evened = compared(metric, old, new, both_ways=both_ways)
     had, ended = len(old.values(metric)), len(new.ok)
     have = sum(new.value(record, metric) is not None for record in new.ok)
     if have < ended and min(had, ended) >= PAIRS and _smallest_p(comparison) > ALPHA:
-        told = f"{have} of {ended} repetitions of this run have a value"
-        return Lost(f"{told}, and a change takes {PAIRS} pairs or more")
+        return f"{have} of {ended} repetitions of this run have a value, {FEW}"
     loss = limit.loss(metric, comparison.first, comparison.second)
     return Change(test, metric, limit, comparison, comparison.p_value, loss, evened)
 

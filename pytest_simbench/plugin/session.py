@@ -255,27 +255,26 @@ class SimSession:
         self, terminalreporter: pytest.TerminalReporter, exitstatus: int
     ) -> None:
         """Print the result, write the report, and say last where it is."""
-        reporter = terminalreporter
         if self.in_worker:  # an xdist worker has a reporter too, which nobody reads
             return
         if self.begun:
             if exitstatus == pytest.ExitCode.INTERRUPTED:
                 self.run.tell_how_to_go_on()
-            self.run.summarise(reporter, self.comparison, exitstatus == pytest.ExitCode.OK)
+            self.run.summarise(terminalreporter, self.comparison, exitstatus == pytest.ExitCode.OK)
         if self.comparison:
-            reporter.write_sep("=", "comparison with the baseline")
-            reporter.write_line(self.comparison.text(reporter._tw.fullwidth))
+            terminalreporter.write_sep("=", "comparison with the baseline")
+            terminalreporter.write_line(self.comparison.text(terminalreporter._tw.fullwidth))
         if self.begun or self.config.pluginmanager.has_plugin("dsession"):
             from pytest_simbench.records.repeatability import NAME
 
             if (self.run.folder.path / NAME).is_file():
                 from pytest_simbench.plugin.repeatability import summarise
 
-                summarise(reporter, self.run.folder.path)
+                summarise(terminalreporter, self.run.folder.path)
         if self.begun and self.run.page is not None:
             from pytest_simbench.report.files import where
 
-            reporter.write_line(where(self.run.page, self.config.invocation_params.dir))
+            terminalreporter.write_line(where(self.run.page, self.config.invocation_params.dir))
 
     def pytest_unconfigure(self) -> None:
         """End what the run started."""

@@ -40,8 +40,6 @@ def append_summary(text: str) -> str:
     return ""
 
 
-LABEL = "simulators"
-
 LONGEST = 60
 """Characters of the message."""
 
@@ -69,7 +67,7 @@ def badge(records: Sequence[Record], passed: bool | None) -> str:
         message, colour = f"{who}: {len(ended)} repetitions passed", "brightgreen"
     data = {
         "schemaVersion": 1,
-        "label": LABEL,
+        "label": "simulators",
         "message": in_one_line(message, LONGEST),
         "color": colour,
     }
