@@ -81,11 +81,13 @@ def fit(
         fitting = Fit(world, told, sought, noise, run)
         try:
             found = fitting.best()
+            results = list(told_of(fitting, found))
         except (KeyboardInterrupt, _OutOfTime) as ended:
-            why = "interrupted" if isinstance(ended, KeyboardInterrupt) else "the budget is used up"
-            print(f"{why} after {fitting.looks} repetitions; the same command goes on")
+            late = isinstance(ended, _OutOfTime)
+            why = "the budget is used up" if late else "interrupted"
+            same = "the same command with a larger --budget" if late else "the same command"
+            print(f"{why} after {fitting.looks} repetitions; {same} goes on")
             return INTERRUPTED
-        results = list(told_of(fitting, found))
         print(for_terminal("\n".join(_lines(results, fitting, found))))
         with refusing(OSError, str(path)):
             write_whole(path, RESULT, _written(results).encode())

@@ -11,6 +11,7 @@ from scipy.stats import t
 
 from pytest_simbench.scene import FloatArray
 from pytest_simbench.tuning.fitting import Fit, State
+from pytest_simbench.tuning.target import TuningError
 from pytest_simbench.tuning.unknowns import Unknown
 
 LEVEL = 0.95
@@ -39,11 +40,17 @@ class Told:
 
 
 def told(fit: Fit, at: State) -> Iterator[Told]:
-    """What the log tells of each unknown, from the slopes where the fit ended."""
+    """What the log tells of each unknown, from the slopes where the fit ended.
+
+    Raises:
+        TuningError: the log is too short to tell anything.
+    """
     fewer = [np.full(rows.size, math.sqrt(_follow(rows))) for rows in at.columns.values()]
     slopes = at.slopes / np.concatenate(fewer)[:, None]
     known, many = slopes.T @ slopes, len(slopes)
     freedom = many - len(known) - 3 * sum("/" in name for name in at.columns)
+    if freedom < 1:
+        raise TuningError(f"{many} numbers of the log do not tell {len(known)}: give a longer log")
     factor = t.ppf((1 + LEVEL) / 2, freedom) * (1.0 if fit.noise else math.sqrt(many / freedom))
     cov = np.linalg.inv(known + 1e-9 * np.eye(len(known)))
     sd = np.sqrt(np.diag(cov))

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+from pytest_simbench.cli.fit import _OutOfTime
 from pytest_simbench.cli.main import main
+from pytest_simbench.tuning.fitting import Fit
 from tests.cli.command import said
 
 DRIVE = """
@@ -55,7 +58,7 @@ BOTH = ("fit", "drive.xml", "log.npz", "--sim", "mujoco", "--noise", "0.001", "-
 
 @pytest.mark.engine
 def test_gains_of_a_drive_from_the_closed_form(
-    folder: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From a quarter of the stiffness and three times the damping; called again it repeats
     nothing, and what a killed one had not come to is run then."""
@@ -73,6 +76,9 @@ def test_gains_of_a_drive_from_the_closed_form(
     again = [json.loads(line) for line in (folder / "out/records.jsonl").read_text().splitlines()]
     assert [r["details"] for r in again] == [json.loads(line)["details"] for line in whole]
     assert capsys.readouterr().out.count(told.partition("values:")[0]) == 2
+    monkeypatch.setattr(Fit, "widened", Mock(side_effect=_OutOfTime))  # while intervals are tried
+    assert main(BOTH) == 130
+    assert "the same command with a larger --budget goes on" in capsys.readouterr().out
 
 
 @pytest.mark.engine

@@ -146,6 +146,12 @@ def test_what_fails_in_part_of_the_range_does_no_harm_and_all_of_it_is_told() ->
     assert found["spring:slider"].value == pytest.approx(90, rel=0.01)
 
 
+def test_a_log_that_is_too_short_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "TIME", TIME[:4])
+    with pytest.raises(TuningError, match="4 numbers of the log do not tell 4: give a longer log"):
+        fit([*TRUTH], noise=None)
+
+
 def test_a_scene_that_cannot_be_simulated_is_told() -> None:
     def none(of: Mapping[str, float], start: float) -> FloatArray:
         return swing(of, start) * (1.0 if of is TRUTH else math.nan)
