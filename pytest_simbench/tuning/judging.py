@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from pytest_simbench.measure.intervals import Interval, betting, interval, proportion, skewed_t
 from pytest_simbench.measure.verdicts import Verdict, confidence, judge
 from pytest_simbench.records.metrics import significant
-from pytest_simbench.tuning.target import Look, Target
+from pytest_simbench.tuning.target import FAILED, Look, Target
 from pytest_simbench.tuning.trials import Candidate, Trials, least_costs
 
 SHARE_MARGIN = 0.05
@@ -43,18 +46,25 @@ def recommended(done: Sequence[Candidate], trials: Trials) -> tuple[Candidate, s
     """The candidate to take, today's if it is that, and why."""
     today, target = done[0], trials.target
     within = [c for c in done if not c.ended and c.cost() <= DEARER * today.cost()]
-    best = min(map(trials.error, within))
-    limit = allowed(target, best)
-    right = [c for c in within if trials.error(c) <= limit]
+    errors = [target.together(c.errors, least=1.0) for c in within]
+    best = min(errors)
+    limit = best + _margin(target, within[errors.index(best)].errors)
+    right = [c for c, error in zip(within, errors, strict=True) if error <= limit]
     found = min(right, key=lambda c: c.cost())
-    keeps = trials.error(today) <= limit
-    if found is today or (keeps and found.cost() > WORTH * today.cost()):
+    if found is today or (today in right and found.cost() > WORTH * today.cost()):
         return today, "no cheaper candidate has an error that is not worse"
-    error = significant(best)
     return found, (
-        f"the cheapest of {len(right)} whose error is not worse than the least, {error}, that "
-        f"{DEARER:g} times today's cost buy (margin: up to {significant(limit)})"
+        f"the cheapest of {len(right)} whose error is not worse than the least, "
+        f"{significant(best)}, that {DEARER:g} times today's cost buy (margin: up to "
+        f"{significant(limit)})"
     )
+
+
+def _margin(target: Target, errors: Mapping[Look, Any]) -> float:
+    """By how much other errors may be larger together; of those that failed nothing follows."""
+    ended = {k: error for k, error in errors.items() if target.laws or np.max(error) < FAILED}
+    known = target.together(ended or errors, least=1.0)
+    return allowed(target, known) - known
 
 
 @dataclass(frozen=True)
@@ -105,7 +115,7 @@ def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
         return Judgement(verdict, len(looks), before, after, None, cheaper, reason)
     more = [b - a for a, b in pairs]
     bound = _difference(more, target.metric.bounded)
-    margin = allowed(target, before) - before
+    margin = _margin(target, {look: today.errors[look] for look in looks})
     verdict, reason = _of_seeds(bound, margin, target.metric.smallest_difference, more)
     return Judgement(verdict, len(looks), before, after, bound, cheaper, reason)
 
@@ -167,9 +177,9 @@ def _difference(more: Sequence[float], bounded: bool) -> Interval:
         bets = betting([(d + 1) / 2 for d in more])
         losses = proportion(sum(d > 0 for d in more), n)
         return Interval(mean, 2 * bets.low - 1, min(2 * bets.high - 1, losses.high), n, "betting")
-    if n < 3 or max(more) == min(more):
+    if n < 3:
         return Interval(mean, -math.inf, math.inf, n, "none")
-    return skewed_t(more)
+    return skewed_t(more) if max(more) > min(more) else Interval(mean, mean, mean, n, "constant")
 
 
 def _of_seeds(
@@ -184,4 +194,5 @@ def _of_seeds(
         return "not worse", told
     if bound.low > 0:
         return "worse", told
-    return "not shown", f"{told}; too few seeds to tell (with no loss {SEEDS} are enough)"
+    enough = f" (with no loss {SEEDS} are enough)" if bound.method == "betting" else ""
+    return "not shown", f"{told}; too few seeds to tell{enough}"

@@ -150,23 +150,25 @@ class Target:
             if right is None or not math.isfinite(right):
                 return None
         if value is None or not math.isfinite(value):
-            return FAILED
+            return 1.0 if self.metric.bounded else FAILED
         if right is not None:
             return abs(value - right)
         best = 1.0 if self.metric.bounded and self.metric.better == "higher" else 0.0
         return abs(value - best)
 
-    def together(self, errors: Mapping[Look, Any], of: Sequence[Look] = ()) -> float:
+    def together(
+        self, errors: Mapping[Look, Any], of: Sequence[Look] = (), least: float = FLOOR
+    ) -> float:
         """The error of a candidate from those of its looks; what it has not had of `of` counts as
         right as can be. Of a task the mean; of claims the mean of the worst, 0 where all are kept;
-        of laws the geometric mean of the phenomena's worst."""
+        of laws the geometric mean of the phenomena's worst, each at least `least`."""
         values = {**dict.fromkeys(of, (-1.0,) * len(self.claims) or 0.0), **errors}
         if not self.laws:
             return float(max(0.0, np.max(np.mean(list(values.values()), axis=0))))
         worst: dict[str, float] = {}
         for look, value in values.items():
             phenomenon = getattr(look.task, "phenomenon", "")
-            worst[phenomenon] = max(worst.get(phenomenon, FLOOR), value)
+            worst[phenomenon] = max(worst.get(phenomenon, least), value)
         return math.exp(sum(map(math.log, worst.values())) / len(worst))
 
 
@@ -241,13 +243,16 @@ def target(
     own = own or (claimed.pop() if len(claimed) == 1 else "")
     wanted = (behind if converged else error) or own
     known = {m.name: m for m in task.metrics}
-    fine = [m for m in known.values() if converged or m.better or m.name in task.references]
-    if not wanted:
-        option = f"--error {CONVERGED}:METRIC" if converged else "--error METRIC"
-        names = ", ".join(m.name for m in fine) or "another test: no metric here has a direction"
-        raise TuningError(f"{name}: name what to choose by, {option} with {names}")
-    if known.get(wanted) not in fine:
+    near = {m.name for m in known.values() if m.better and (m.bounded or m.better == "lower")}
+    near |= {*task.references}  # who has a right value; to be higher still is none
+    fine = [m for m in known.values() if converged or m.name in near]
+    if wanted and wanted not in known:
         raise TuningError(str(UnknownMetric(wanted, [m.name for m in fine])))
+    if not wanted or known[wanted] not in fine:
+        why = wanted and f"nothing tells the right {wanted}; "
+        option = f"--error {CONVERGED}:METRIC" if converged else "--error METRIC"
+        names = ", ".join(m.name for m in fine) or "another test: no metric here has a right value"
+        raise TuningError(f"{name}: {why}name what to choose by, {option} with {names}")
     return Target(name, cost, chosen, kept, known[wanted], converged=converged, first_judged=first)
 
 

@@ -12,7 +12,7 @@ from pytest_simbench.laws import LAWS
 from pytest_simbench.measure.verdicts import at_least
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.tuning.judging import SEEDS, allowed, judged, recommended
-from pytest_simbench.tuning.target import Look, Target
+from pytest_simbench.tuning.target import FAILED, Look, Target
 from pytest_simbench.tuning.trials import Candidate
 from tests.records.build import record
 
@@ -45,6 +45,30 @@ def test_the_cheapest_as_right_as_the_best(
     assert why
 
 
+@pytest.mark.parametrize(
+    ("cheap", "wanted"), [((0.01, 0.01, 400.0), 0), ((1.0, 1.0, 1.0), 1), ((0.8, 0.01, 1.1), 1)]
+)
+def test_a_law_that_is_broken_is_not_made_up_for_by_others_that_are_kept_well(
+    tmp_path: Path, cheap: tuple[float, ...], wanted: int
+) -> None:
+    laws = {law.phenomenon: Look(law) for law in LAWS}
+    three = tuple(laws.values())[:3]
+    looks, _ = trials(tmp_path, lambda s, k: 1.0, Target("laws:x", "cpu_cost", three, three))
+    today = candidate([0.5, 0.01, 0.01], 1.0, looks.target, "")
+    done = [today, candidate([*cheap], 0.5, looks.target, "")]
+    assert done.index(recommended(done, looks)[0]) == wanted
+
+
+def test_what_failed_on_both_sides_widens_no_margin(tmp_path: Path) -> None:
+    late = Metric("late", "late", unit="s", better="lower", least=0)
+    looks, _ = trials(tmp_path, lambda s, k: 1.0, replace(target(8, 8), metric=late))
+    errors = [FAILED, *(1.0 + k / 100 for k in range(7))]
+    thrice = [FAILED, *(3 * error for error in errors[1:])]
+    done = [candidate(errors, 1.0, looks.target, ""), candidate(thrice, 0.5, looks.target, "")]
+    assert recommended(done, looks)[0] is done[0]
+    assert judged(*done, looks.target).verdict == "not shown"
+
+
 def test_margins() -> None:
     of = target()
     assert allowed(of, 0.2) == pytest.approx(0.25)
@@ -69,13 +93,26 @@ def test_verdicts_on_seeds(before: list[float], after: list[float], verdict: str
     assert found.worse_by.low <= found.worse_by.mean <= found.worse_by.high
 
 
-@pytest.mark.parametrize(("less", "verdict"), [(1e-6, "not worse"), (5e-3, "better")])
-def test_less_than_what_means_anything_is_no_better(less: float, verdict: str) -> None:
+@pytest.mark.parametrize(
+    ("seeds", "less", "spread", "verdict"),
+    [
+        (8, 1e-6, 1e-9, "not worse"),
+        (8, 5e-3, 1e-9, "better"),
+        (8, 0.0, 0.0, "not worse"),  # what every seed says
+        (8, -1.0, 0.0, "worse"),
+        (2, 0.0, 0.0, "not shown"),
+    ],
+)
+def test_less_than_what_means_anything_is_no_better(
+    seeds: int, less: float, spread: float, verdict: str
+) -> None:
     late = Metric("late", "late", unit="s", better="lower", least=0)
-    of = replace(target(1, 8), metric=late)
-    before = [1.0 + k / 100 for k in range(8)]
-    old, new = (candidate(e, 1.0, of) for e in (before, [x - less for x in before]))
-    assert judged(old, new, of).verdict == verdict
+    of = replace(target(1, seeds), metric=late)
+    before = [1.0] * seeds
+    after = [1.0 - less + k * spread for k in range(seeds)]
+    found = judged(candidate(before, 1.0, of), candidate(after, 1.0, of), of)
+    assert found.verdict == verdict
+    assert "with no loss" not in found.reason
 
 
 def test_the_cost_is_told_with_its_interval() -> None:

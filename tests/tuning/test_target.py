@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ from pytest_simbench.tuning.target import (
     target,
 )
 from tests.records.build import record
-from tests.tiny import WHITE
+from tests.tiny import WHITE, Falling
 
 from .made_up import LANDED
 from .made_up import target as of_falling
@@ -82,7 +82,7 @@ def test_shares_are_what_is_missing() -> None:
         ("x", "cpu_cost", None, "is named 'x'; choose from stacking, throwing, pushing, tosses"),
         ("stacking", "rtf", None, "--cost=rtf: choose from cpu, ram"),
         ("throwing", "cpu_cost", "hits", "did you mean 'hit'"),
-        ("throwing", "cpu_cost", "limits", "no metric is named 'limits'"),
+        ("throwing", "cpu_cost", "limits", "nothing tells the right limits; name what to choose"),
         ("throwing", "cpu_cost", "converged:hits", "did you mean 'hit'"),
         ("laws:impact", "cpu_cost", "converged", "--error: laws have their own"),
     ],
@@ -90,6 +90,23 @@ def test_shares_are_what_is_missing() -> None:
 def test_bad_names(name: str, cost: str, error: str | None, message: str) -> None:
     with pytest.raises(TuningError, match=message):
         target(name, cost, error, 4, 9)
+
+
+def test_what_has_no_right_value_is_not_tuned_for() -> None:
+    """Of a height of which more is better the error would be the height, and less be sought."""
+    height = Metric("height", "height", unit="m")
+
+    @dataclass(frozen=True)
+    class Lifting(Falling):
+        metrics = (height, LANDED)
+
+    with pytest.raises(TuningError, match="the right height; .* --error METRIC with landed$"):
+        target("t.py::test_it", "cpu_cost", "height", 4, 9, asked=(Lifting(), ()))
+    found = target("t.py::test_it", "cpu_cost", "converged:height", 4, 9, asked=(Lifting(), ()))
+    assert found.metric is height
+    of = replace(of_falling(), metric=LANDED)
+    lost = record(metrics={"landed": None})
+    assert of.error(of.chosen[0], lost, lost) == 1.0  # a proportion cannot be farther off
 
 
 def test_claims_are_of_the_mean() -> None:
