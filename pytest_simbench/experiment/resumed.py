@@ -22,7 +22,7 @@ from pytest_simbench.records.series import configurations, short
 
 
 def run_to_resume(folder: Path | None, runs: Path) -> Path:
-    """The run in a folder, or without one that of those in `runs` which began last.
+    """The run in a folder, or without one that of those in `runs` which began last; no search.
 
     Raises:
         NotResumed: there is none.
@@ -30,7 +30,7 @@ def run_to_resume(folder: Path | None, runs: Path) -> Path:
     if folder is not None:
         found, where = [folder / RECORDS], f"{folder} (it has no {RECORDS})"
     else:
-        found, where = sorted(runs.glob(f"*/{RECORDS}"), key=_begun), f"{runs}"
+        found, where = sorted(runs.glob(f"[0-9]*/{RECORDS}"), key=_begun), f"{runs}"
     if not found or not found[-1].is_file():
         raise NotResumed(f"there is no run to resume in {where}; name the folder of a run")
     return found[-1].parent

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -139,6 +140,7 @@ def test_a_policy_that_cannot_be_asked_is_one_sentence(scripted: dict[str, Any])
 
 def test_a_run_is_gone_on_with(scripted: dict[str, Any]) -> None:
     first = simbench.run(Falling(), "mujoco", reps=2)
+    shutil.copytree(first.folder, ".simbench/tune-mujoco-falling")  # a search is no run
     more = simbench.run(Falling(), "mujoco", reps=3, resume=True)  # the newest
     assert more.folder == first.folder
     assert [r.repetition for r in more.contents.every] == [1, 2, 3]
