@@ -54,7 +54,7 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
         if not end.values(metric):
             raise BadInput(f"{search.describe(place)}, so nothing tells worse")
     found, _ = compared(metric, good, bad)
-    if not found.significant():
+    if not (found.significant() and metric.differs(found.first, found.second)):
         print(
             f"{search.describe(0)}, {search.describe(last)}: these repetitions do not show that it "
             f"is worse (p = {found.p_value:.2g}), so there is nothing to find; try more of them, "
@@ -70,8 +70,11 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
 
     place = first_worse(len(releases), is_worse)
     sides = search.result(place - 1), search.result(place)
-    known = all(side.values(metric) for side in sides)
-    sure = f" (p = {compared(metric, *sides)[0].p_value:.2g})" if known else ""
+    sure = ""
+    if all(side.values(metric) for side in sides):
+        step, _ = compared(metric, *sides)
+        apart = "" if step.significant() else ", which does not tell the two apart"
+        sure = f" (p = {step.p_value:.2g}{apart})"
     print(
         f"the first worse release is {releases[place]}: {search.describe(place - 1)}, "
         f"{search.describe(place)}{sure}"

@@ -179,14 +179,9 @@ def _changed(course: MetricCourse, rows: int, history: TaskHistory) -> MetricCou
     found = steps(present) if sole else change_points(present, rows=rows)
     if course.metric.name in COSTS:
         found = [c for c in found if abs(c.after - c.before) > SMALLEST * abs(c.before)]
-    return replace(course, changes=tuple(c for c in found if _matters(course.metric, c)))
-
-
-def _matters(metric: Metric, change: ChangePoint) -> bool:
-    """Whether a change is one that means anything, and that a reader sees in three digits: a
-    deterministic engine's rounding is significant too."""
-    shown = metric.format(change.before) != metric.format(change.after)
-    return shown and abs(change.after - change.before) >= metric.smallest_difference
+    return replace(
+        course, changes=tuple(c for c in found if course.metric.differs(c.before, c.after))
+    )
 
 
 @dataclass(frozen=True)

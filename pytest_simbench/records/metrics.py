@@ -111,6 +111,12 @@ class Metric:
             return self.resolution
         return RESOLUTIONS.get(self.unit, 0.0) if self.kind == "value" else 0.0
 
+    def differs(self, before: float, after: float) -> bool:
+        """Whether two means differ by what means anything, and in the three digits that a reader
+        sees: a deterministic engine's rounding is significant too."""
+        shown = self.format(before) != self.format(after)
+        return shown and abs(after - before) >= self.smallest_difference
+
     @property
     def crashed(self) -> float | None:
         """What a crashed repetition counts with: the worst that a share or a yes/no metric can be.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,31 +14,39 @@ from pytest_simbench.records.folder import RunFolder
 from tests.cli.test_bisect_ends import RELEASES, Recorded
 from tests.records.build import METRICS, failed, record
 
+FOUND = "the first worse release is 1.10: 1.9 landing_error "
+LOST = "0.1 m, 1.10 landing_error is not there"
+
 
 @pytest.mark.parametrize(
-    ("third", "said"),
+    ("errors", "noise", "said"),
     [
-        (None, "1.10 landing_error is not there\n"),
-        ("crashed", "1.10 landing_error is not there, 6 crashed\n"),
-        (0.7, "1.10 landing_error 0.7 m (p = 0.016)\n"),
+        ((0.1, 0.1, None, 0.5, 0.5), 0.0, f"{LOST}\n"),
+        ((0.1, 0.1, "crashed", 0.5, 0.5), 0.0, f"{LOST}, 6 crashed\n"),
+        ((0.1, 0.1, 0.7, 0.5, 0.5), 0.0, "0.1 m, 1.10 landing_error 0.7 m (p = 0.016)\n"),
+        ((0.1, 0.2, 0.31, 0.4, 0.5), 0.15, " (p = 0.12, which does not tell the two apart)\n"),
+        ((0.1, 0.1, 0.1, 0.1, 0.1 + 1e-9), 0.0, "these repetitions do not show that it is worse"),
     ],
 )
-def test_a_release_without_a_value_is_worse(
+def test_what_the_repetitions_show(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
-    third: float | str | None,
+    errors: tuple[Any, ...],
+    noise: float,
     said: str,
 ) -> None:
     monkeypatch.setattr(bisect, "Search", Recorded)
     monkeypatch.setattr(bisect, "_releases", lambda wanted: RELEASES)
     run = RunFolder(tmp_path)
     run.describe(TaskDescription("stacking", METRICS))
-    for release, error in zip(RELEASES, (0.1, 0.1, third, 0.5, 0.5), strict=True):
+    for place, (release, error) in enumerate(zip(RELEASES, errors, strict=True)):
         named = {"simulator": f"sim=={release}", "test": f"test_stacking[sim=={release}-headless]"}
         for k in range(6):
-            made = record(k, metrics={"landing_error": error}, **named)
+            value = error + noise * ((k + place) % 3) if isinstance(error, float) else None
+            made = record(k, metrics={"landing_error": value}, **named)
             run.append(failed(k, **named) if error == "crashed" else made)
-    assert bisect.bisect(Span("sim", "1.8", "1.12"), "landing_error", tmp_path, []) == 0
+    status = bisect.bisect(Span("sim", "1.8", "1.12"), "landing_error", tmp_path, [])
     told = capsys.readouterr().out
-    assert f"the first worse release is 1.10: 1.9 landing_error 0.1 m, {said}" in told
+    assert said in told
+    assert status == (FOUND not in told)

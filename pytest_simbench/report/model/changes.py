@@ -41,7 +41,7 @@ def _rows(report: GateReport) -> list[tuple[Change, str]]:
     found += [
         (change, _free(change))
         for change in report.others
-        if change.significant or change.metric.study or change.metric.name in ALWAYS
+        if _clear(change) or change.metric.study or change.metric.name in ALWAYS
     ]
     tests = list(dict.fromkeys(change.test for change, _ in found))
     return sorted(found, key=lambda row: tests.index(row[0].test))
@@ -56,8 +56,13 @@ def _limited(change: Change) -> str:
     return f"passed, limit {limit}"
 
 
+def _clear(change: Change) -> bool:
+    means = change.comparison.first, change.comparison.second
+    return change.significant and change.metric.differs(*means)
+
+
 def _free(change: Change) -> str:
-    if not change.significant:
+    if not _clear(change):
         return "no clear change"
     return "worse" if change.loss > 0 else "better"
 

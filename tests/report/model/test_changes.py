@@ -71,6 +71,12 @@ def test_a_change_without_a_limit_is_called_worse_or_better_only_when_it_is_sure
     chance = render_changes(compared([few, *made(1.0, 0.0)[1:]]), 120, False)
     assert "untouched_moved" not in chance  # neither of the study's metrics nor a clear change
     assert "passed" not in worse + chance
+    error = Metric("error", "error", "m", "lower", study=True)  # and never for rounding
+    sides = [
+        [record(repetition=k, metrics={"error": v}) for k in range(20)] for v in (0.1, 0.1 + 1e-9)
+    ]
+    tiny = render_changes(run_gate(*sides, (), {"stacking": (error,)}), 120, False)
+    assert line(tiny, "error").endswith("no clear change")
 
 
 def test_a_large_change_that_may_be_chance_is_said_to_be_one() -> None:
