@@ -39,6 +39,7 @@ from pytest_simbench.report.files import shown
 from pytest_simbench.simulator.registry import adapter, known
 from pytest_simbench.tuning.judging import SEEDS, recommended
 from pytest_simbench.tuning.search import Search, finished, folder_name, front, space_of
+from pytest_simbench.tuning.target import FINER
 from pytest_simbench.tuning.target import target as target_of
 from pytest_simbench.tuning.trials import Candidate, Trials
 
@@ -186,6 +187,6 @@ def _judge(trials: Trials, today: Candidate, found: Candidate, seconds: float) -
     looks = trials.target.judged
     if not trials.target.laws:
         took = [r.cost("total") or 0.1 for c in (today, found) for r in c.records.values()]
-        each = 2 * sum(took) / len(took)
+        each = (2 + FINER * trials.target.converged) * sum(took) / len(took) / trials.runs.jobs
         looks = looks[: max(FEWEST_JUDGED, int(seconds / each))]
     return trials.judge(today, found, looks=looks)

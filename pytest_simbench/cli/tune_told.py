@@ -134,15 +134,17 @@ def profile_of(of: Result) -> str:
     record, task = next(iter(found.records.values())), target.chosen[0].task
     numbers = [look.number + FIRST_CHOSEN - 1 for look in target.chosen]
     chosen: dict[str, Any] = {"by": f"simbench tune {target.name}", "reason": of.why}
+    before = case.file.chosen_on if case.file else ()
+    seeds = [[one.task, one.first, one.last] for one in before]
     if target.laws:
         chosen["laws"] = list(dict.fromkeys(look.task.name for look in target.chosen))
     elif isinstance(task, MeasuredTask):
         chosen["motions"] = {task.data: sorted(task.real(seed).number for seed in numbers)}
     else:
-        chosen["seeds"] = [[task.name, numbers[0], numbers[-1]]]
+        seeds.append([task.name, numbers[0], numbers[-1]])
         if target.judged:
             chosen["judged_from"] = target.first_judged + target.judged[0].number - 1
-    chosen |= {"versions": dict(record.versions), "commit": _commit()}
+    chosen |= {"seeds": seeds, "versions": dict(record.versions), "commit": _commit()}
     changes = {**case.changes, **found.changes}
     return write_profile(case.base, base_name(case.simulator), changes, chosen)
 

@@ -121,4 +121,4 @@ def _text(value: Any) -> str:
     """A value as TOML has it: of these kinds as JSON, but for tables."""
     if isinstance(value, Mapping):
         return f"{{ {', '.join(f'{json.dumps(k)} = {_text(v)}' for k, v in value.items())} }}"
-    return json.dumps(value, ensure_ascii=False)
+    return json.dumps("none" if value is None else value, ensure_ascii=False)

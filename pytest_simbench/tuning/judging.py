@@ -160,10 +160,11 @@ def _of_claims(
             f"{metric.name} {claim}: {new.verdict} ({significant(new.interval.mean)}), today "
             f"{old.verdict} ({significant(old.interval.mean)})"
         )
-    reason = f"{'; '.join(told)}; {len(looks)} seeds"
+    reason = f"{'; '.join(told)}; {len(looks)} seeds, of which {found.failed} failed"
     if any(new is Verdict.REFUTED and old is not new for old, new in verdicts):
         return "worse", reason
-    if any(new is not Verdict.SUPPORTED for _, new in verdicts):
+    lost = found.failed > today.failed  # a length or a time of what failed is none
+    if lost or any(new is not Verdict.SUPPORTED for _, new in verdicts):
         return "not shown", reason
     refuted = any(old is Verdict.REFUTED for old, _ in verdicts)
     return "better" if refuted else "not worse", reason

@@ -8,13 +8,18 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from pytest_simbench.cli.main import main
+from pytest_simbench.cli.tune import _judge
+from pytest_simbench.cli.tune_told import Result, profile_of
+from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.simulator.profile_file import read_profile
 from tests.cli.command import said
+from tests.tuning.made_up import target, trials
 
 pytest.importorskip("optuna")
 
@@ -50,6 +55,23 @@ def test_a_grip_that_creeps(
     (tmp_path / "out/front.png").mkdir()
     assert main([*SLIPS, *few, "--trials", "8"]) == 2
     assert "Is a directory" in capsys.readouterr().err
+
+
+def test_how_many_seeds_are_judged_and_on_which_it_was_chosen(tmp_path: Path) -> None:
+    """In a time, of looks of 1 s; a smaller step costs eight of them. A profile that began with
+    another file's was chosen on its seeds, too."""
+    path = tmp_path / "first.toml"
+    path.write_text('simulator = "mujoco"\n[chosen]\nseeds = [["stacking", 7, 9]]\n')
+    for jobs, converged, seeds in ((1, False, 10), (2, False, 20), (2, True, 5)):
+        of = replace(target(2, 40), converged=converged)
+        looks, _ = trials(tmp_path / f"{jobs}{converged}", lambda s, k: 1.0, of, jobs)
+        looks.case = replace(looks.case, file=read_profile(path))
+        today = looks.today()
+        halves = _judge(looks, today, looks.choose("trial1", {}, [today]), 20.0)
+        assert [len(one.records) for one in halves] == [seeds, seeds]
+    path.write_text(profile_of(Result(looks, [today], today, "", halves)))
+    told = [Seen.seeds("stacking", 7, 9), Seen.seeds("falling", 300_001, 300_002)]
+    assert [*read_profile(path).chosen_on] == told
 
 
 TEST = """

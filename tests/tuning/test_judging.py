@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 
 from pytest_simbench.laws import LAWS
-from pytest_simbench.measure.verdicts import at_least
+from pytest_simbench.measure.verdicts import at_least, at_most
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.tuning.judging import SEEDS, allowed, judged, recommended
 from pytest_simbench.tuning.target import FAILED, Look, Target
 from pytest_simbench.tuning.trials import Candidate
-from tests.records.build import record
+from tests.records.build import failed, record
 
 from .made_up import target, trials
 
@@ -165,6 +165,18 @@ def test_claims_are_judged_as_a_test_judges_them(
     assert found.verdict == verdict
     assert "landed at least 0.6: " in found.reason
     assert allowed(of, 0.0) == 0.0  # who keeps them may not break them
+
+
+def test_who_fails_more_often_is_not_shown_to_keep_a_claim() -> None:
+    """A time of what failed is none, so that the others alone keep it."""
+    late = Metric("late", "late", unit="s", better="lower", least=0)
+    of = replace(target(1, 20), metric=None, claims=((late, at_most(2.0)),))
+    sides = [candidate([0.0] * 20, 1.0, of) for _ in range(2)]
+    for one, lost in zip(sides, (0, 3), strict=True):
+        for k, look in enumerate(of.judged):
+            one.records[look] = failed(k) if k < lost else record(metrics={"late": 1.0})
+    found = judged(*sides, of)
+    assert (found.verdict, found.reason[-27:]) == ("not shown", "20 seeds, of which 3 failed")
 
 
 def test_nothing_to_hold_them_against() -> None:
