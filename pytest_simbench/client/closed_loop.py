@@ -26,6 +26,7 @@ from pytest_simbench.scene.policy import (
     Policy,
     Rhythm,
     checked,
+    name_of,
 )
 from pytest_simbench.scene.set_points import SetPoints, Sight
 from pytest_simbench.worker.loop import raised
@@ -48,7 +49,7 @@ def shipped(policy: Policy, seed: int, goal: Pose | None) -> dict[str, Any]:
         source = Path(path or "").read_text("utf-8")
     except (OSError, TypeError) as error:
         raise PolicyError(
-            f"the source of the policy {policy.name} cannot be read: {named(error)}"
+            f"the source of the policy {name_of(policy)} cannot be read: {named(error)}"
         ) from None
     if not made.__qualname__.isidentifier():
         raise PolicyError(
@@ -57,15 +58,15 @@ def shipped(policy: Policy, seed: int, goal: Pose | None) -> dict[str, Any]:
         )
     if made.__module__ == "__main__" and "__main__" not in source:
         raise PolicyError(
-            f"the policy {policy.name} stands in the script that was started, which would run "
+            f"the policy {name_of(policy)} stands in the script that was started, which would run "
             "again inside the worker; put it into a file of its own, or the rest of the script "
             "under if __name__ == '__main__'"
         )
     odd = sorted(name for name, value in state.items() if not isinstance(value, PLAIN))
     if odd:
         raise PolicyError(
-            f"the policy {policy.name} holds {', '.join(odd)}, which cannot go to the worker; only "
-            "numbers, texts, arrays, lists and dicts can"
+            f"the policy {name_of(policy)} holds {', '.join(odd)}, which cannot go to the worker; "
+            "only numbers, texts, arrays, lists and dicts can"
         )
     told = None if goal is None else goal.as_array()
     named_so = {"path": path, "source": source, "name": made.__name__}
@@ -275,10 +276,6 @@ class Episode:
         seconds = self.at_most if callable(self.until) else self.until
         return checked(seconds, "the seconds of a closed loop", above=True)
 
-    @property
-    def name(self) -> str:
-        return getattr(self.policy, "name", type(self.policy).__name__)
-
     def inner(
         self, process: WorkerProcess, scene: Scene, timestep: float, log_period: float | None
     ) -> Mapping[str, Any]:
@@ -295,7 +292,7 @@ class Episode:
                 forces=False, picture=None, inside=shipped(self.policy, self.seed, self.goal),
             )  # fmt: skip
         except WorkerHung as error:
-            told = f"the policy {self.name}, which ran inside it, may be what stalls"
+            told = f"the policy {name_of(self.policy)}, which ran inside it, may be what stalls"
             raise WorkerHung(f"{error.what}; {told}", process.where, error.log_tail) from None
         return answer
 
@@ -308,7 +305,7 @@ class Episode:
             The worker's answer, the states at each observation, and the seconds that the policy
             took.
         """
-        watched = Watched(process, self.name)
+        watched = Watched(process, name_of(self.policy))
         states: list[Observation] = []
         loop: ClosedLoop | None = None
 

@@ -24,7 +24,7 @@ def read(config: pytest.Config) -> list[Any]:
     """
     from pytest_simbench.experiment.policy_file import read_policies
     from pytest_simbench.ground.errors import PolicyError
-    from pytest_simbench.tasks.goals import name_of
+    from pytest_simbench.scene.policy import name_of
 
     found = []
     with options.refusing(PolicyError, "--policies"):
@@ -52,7 +52,7 @@ def parametrize(metafunc: pytest.Metafunc, found: list[Any]) -> None:
 
     The shipped ones take hours on all simulators: they wait until somebody names the test's file.
     """
-    from pytest_simbench.tasks.goals import name_of
+    from pytest_simbench.scene.policy import name_of
 
     mark = metafunc.definition.get_closest_marker(MARK)
     task, *names = (mark.args if mark is not None else ()) or ("",)

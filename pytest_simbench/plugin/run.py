@@ -49,7 +49,7 @@ class Run:
         folder: of this run; locked by `use`, before the first test that needs it.
         problem: why the folder cannot be used, as a sentence, for tests that need it.
         reading: what the folder holds once the run is `complete`; empty before.
-        mistake: in what was typed, found when the tests had ended; one sentence.
+        mistake: in what was typed, found when the tests had ended; one sentence, told last.
         resumed: the interrupted run that this one completes, if it does.
         failing: whether a test of the resumed run that did not run again had failed.
         page: to look at, once the whole report is written.
@@ -241,7 +241,7 @@ class Run:
         if not ended or session.shouldstop or session.shouldfail:
             return  # some tests have not run, and may know it
         if self._thresholds and (self.reading.records or self.reading.thresholds):
-            self.mistake = thresholds.problem(self._thresholds, self.reading)
+            self.mistake = for_terminal(thresholds.problem(self._thresholds, self.reading))
             if self.mistake:
                 session.exitstatus = pytest.ExitCode.USAGE_ERROR
 
@@ -296,8 +296,6 @@ class Run:
     ) -> None:
         """Print the result and write the report files; the badge says whether tests and limits
         passed."""
-        if self.mistake:
-            reporter.write_line(f"ERROR: {for_terminal(self.mistake)}", red=True)
         if not self.reading.records and not (self.folder.path / NAME).is_file():
             return
         path, records = self.folder.path, self.reading.records

@@ -275,6 +275,8 @@ class SimSession:
             from pytest_simbench.report.files import where
 
             terminalreporter.write_line(where(self.run.page, self.config.invocation_params.dir))
+        if self.begun and self.run.mistake:
+            terminalreporter.write_line(f"ERROR: {self.run.mistake}", red=True)
 
     def pytest_unconfigure(self) -> None:
         """End what the run started."""

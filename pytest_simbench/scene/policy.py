@@ -167,6 +167,12 @@ class Function(Policy):
         return self._act(observation)
 
 
+def name_of(policy: Any) -> str:
+    """For records and messages."""
+    named = getattr(policy, "name", None) or getattr(policy, "__name__", None)
+    return str(named or type(policy).__name__)
+
+
 def as_policy(given: Any, rate: float | None = None) -> Any:
     """Whatever has `act`, or a function.
 

@@ -26,7 +26,7 @@ from pytest_simbench.motion.model import grasping_scale_of, scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Robot, Scene
-from pytest_simbench.scene.policy import Function, Observation, checked
+from pytest_simbench.scene.policy import Function, Observation, checked, name_of
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Randomness, Task, cube
 from pytest_simbench.tasks.pushing import BLOCK_MASS, BLOCK_SIZE, FRICTION, RED
 from pytest_simbench.worker.wire import pack
@@ -275,12 +275,6 @@ def _copied(policy: Any) -> Any:
             with suppress(Exception):
                 held[name] = deepcopy(value, known)
     return own
-
-
-def name_of(policy: Any) -> str:
-    """Of a policy, for records."""
-    named = getattr(policy, "name", None) or getattr(policy, "__name__", None)
-    return str(named or type(policy).__name__)
 
 
 _PARSING = Lock()

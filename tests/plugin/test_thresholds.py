@@ -43,6 +43,7 @@ def test_a_name_that_no_test_knows_is_told_at_the_end(
     result = run_pytest(pytester, "", *arguments, passed=2, ret=pytest.ExitCode.USAGE_ERROR)
     result.stdout.fnmatch_lines(
         [
+            "report: *",
             "ERROR: --sim-threshold=landet=1: no metric is named 'landet'; did you mean 'landed'? "
             "valid names: *crashed, *landed, *own_metric*",
         ]
