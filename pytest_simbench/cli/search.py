@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.cli.values import BadInput, shown
+from pytest_simbench.cli.values import BadInput, refusing, shown
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.limits import named
 from pytest_simbench.measure.results import ResultSet
@@ -65,10 +65,8 @@ class Search:
         name, result = self.metric_name, self.result(0)
         if named(name, result.known) == CRASHED.name:
             return CRASHED
-        try:
+        with refusing(UnknownMetric):
             metric = result.metric(name)
-        except UnknownMetric as error:
-            raise BadInput(str(error)) from None
         if metric.better is None:
             raise BadInput(f"{name} can be neither better nor worse")
         return metric

@@ -187,6 +187,6 @@ def _judge(trials: Trials, today: Candidate, found: Candidate, seconds: float) -
     looks = trials.target.judged
     if not trials.target.laws:
         took = [r.cost("total") or 0.1 for c in (today, found) for r in c.records.values()]
-        each = (2 + FINER * trials.target.converged) * sum(took) / len(took) / trials.runs.jobs
-        looks = looks[: max(FEWEST_JUDGED, int(seconds / each))]
+        each = (2 + FINER * trials.target.converged) * sum(took) / len(took)
+        looks = looks[: max(FEWEST_JUDGED, int(seconds * trials.runs.executor.jobs / each))]
     return trials.judge(today, found, looks=looks)

@@ -73,13 +73,11 @@ class Judgement:
 
     Attributes:
         verdict: `better`, `not worse`, `worse` or `not shown`.
-        looks: laws or seeds behind it.
         worse_by: by how much the error is larger, with its interval; None of laws and claims.
         cheaper: today's cost over the candidate's, with its interval; None where too few.
     """
 
     verdict: str
-    looks: int
     before: float
     after: float
     worse_by: Interval | None
@@ -93,9 +91,7 @@ def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
     if target.laws:
         looks = [look for look in looks if look.number == 1]
     if not looks:
-        why = "nothing tells what is right there"
-        return Judgement("not shown", 0, math.nan, math.nan, None, None, why)
-    pairs = [(today.errors[look], found.errors[look]) for look in looks]
+        return Judgement("not shown", math.nan, math.nan, None, None, "nothing tells what is right")
     before = target.together({look: today.errors[look] for look in looks})
     after = target.together({look: found.errors[look] for look in looks})
     old, new = least_costs(today.costs), least_costs(found.costs)
@@ -112,12 +108,12 @@ def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
     if target.metric is None:
         of_kind = _of_laws if target.laws else _of_claims
         verdict, reason = of_kind(target, looks, today, found)
-        return Judgement(verdict, len(looks), before, after, None, cheaper, reason)
-    more = [b - a for a, b in pairs]
+        return Judgement(verdict, before, after, None, cheaper, reason)
+    more = [found.errors[look] - today.errors[look] for look in looks]
     bound = _difference(more, target.metric.bounded)
     margin = _margin(target, {look: today.errors[look] for look in looks})
     verdict, reason = _of_seeds(bound, margin, target.metric.smallest_difference, more)
-    return Judgement(verdict, len(looks), before, after, bound, cheaper, reason)
+    return Judgement(verdict, before, after, bound, cheaper, reason)
 
 
 def _of_laws(

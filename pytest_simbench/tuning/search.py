@@ -110,7 +110,8 @@ class Search:
                 known[key] = self.trials.choose(f"trial{number}", asked, self.done)
                 self.done.append(known[key])
                 self.tell(known[key], front(self.done, self.trials))
-            study.tell(trial, self._values(known[key], today))
+            cost = min(known[key].cost(), 10 * today.cost())  # also of one that failed at once
+            study.tell(trial, (cost, self.trials.error(known[key])))
             number += 1
         return self.done
 
@@ -194,11 +195,6 @@ class Search:
     def _key(self, asked: Mapping[str, Any]) -> str:
         """Equal for equal settings."""
         return json.dumps({**self.base.to_wire(), **asked}, sort_keys=True, default=list)
-
-    def _values(self, found: Candidate, today: Candidate) -> tuple[float, float]:
-        """What Optuna is told: of one that failed before it cost anything ten times today's."""
-        cost = found.cost()
-        return min(cost, 10 * today.cost()), self.trials.error(found)
 
 
 def finished(done: Sequence[Candidate]) -> list[Candidate]:

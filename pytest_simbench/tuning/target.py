@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from pytest_simbench import tasks
 from pytest_simbench.data import impacts, pushes, tosses
 from pytest_simbench.data.sets import read
 from pytest_simbench.ground.errors import SimulatorError
@@ -19,35 +20,22 @@ from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.records.phenomena import PHENOMENA
 from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
-from pytest_simbench.tasks import (
-    ArmFollowing,
-    ArmPushing,
-    Impacting,
-    Pushing,
-    Stacking,
-    Throwing,
-    Tossing,
-)
 from pytest_simbench.tasks.base import Task
 from pytest_simbench.tasks.measured import MeasuredTask
 from pytest_simbench.tasks.on_scene import OnScene
 
 LAWS_WORD = "laws"
 
-TASKS: Mapping[str, tuple[type[Task], str]] = {
-    "stacking": (Stacking, "at_end"),
-    "throwing": (Throwing, "hit"),
-    "pushing": (Pushing, "position_error"),
+TASKS: Mapping[str, tuple[Callable[[], Task], str]] = {
+    "stacking": (tasks.Stacking, "at_end"),
+    "throwing": (tasks.Throwing, "hit"),
+    "pushing": (tasks.Pushing, "position_error"),
+    "tosses": (lambda: tasks.Tossing(read(tosses.NAME)), "position_error"),
+    "impacts": (lambda: tasks.Impacting(read(impacts.NAME)), "velocity_error"),
+    "pushes": (lambda: tasks.ArmPushing(read(pushes.NAME)), "displacement_error"),
+    "commands": (lambda: tasks.ArmFollowing(read(pushes.NAME)), "hand_error"),
 }
 """Tasks by name, and the metric by which they are chosen where nobody names one."""
-
-REAL: Mapping[str, tuple[Any, str, str]] = {
-    "tosses": (Tossing, tosses.NAME, "position_error"),
-    "impacts": (Impacting, impacts.NAME, "velocity_error"),
-    "pushes": (ArmPushing, pushes.NAME, "displacement_error"),
-    "commands": (ArmFollowing, pushes.NAME, "hand_error"),
-}
-"""Tasks against measured data, the data set, and their metric."""
 
 CONVERGED, FINER = "converged", 8
 """Error: how far from what today's settings give with the time step divided so."""
@@ -151,10 +139,8 @@ class Target:
                 return None
         if value is None or not math.isfinite(value):
             return 1.0 if self.metric.bounded else FAILED
-        if right is not None:
-            return abs(value - right)
         best = 1.0 if self.metric.bounded and self.metric.better == "higher" else 0.0
-        return abs(value - best)
+        return abs(value - (best if right is None else right))
 
     def together(
         self, errors: Mapping[Look, Any], of: Sequence[Look] = (), least: float = FLOOR
@@ -223,15 +209,12 @@ def target(
     claims: Claims = ()
     if asked:
         (task, claims), own = asked, ""
-    elif name in REAL:
-        kind, data, own = REAL[name]
-        task = kind(read(data))
     elif name in TASKS:
         make, own = TASKS[name]
         task = make()
     else:
         raise TuningError(
-            f"nothing to tune for is named {name[:60]!r}; choose from {', '.join((*TASKS, *REAL))},"
+            f"nothing to tune for is named {name[:60]!r}; choose from {', '.join(TASKS)},"
             f" laws:NAME,... with {', '.join(PHENOMENA)} or single laws, or FILE.py::TEST"
         )
     chosen, kept, first = _halves(task, seeds, judged)
@@ -243,9 +226,9 @@ def target(
     own = own or (claimed.pop() if len(claimed) == 1 else "")
     wanted = (behind if converged else error) or own
     known = {m.name: m for m in task.metrics}
-    near = {m.name for m in known.values() if m.better and (m.bounded or m.better == "lower")}
-    near |= {*task.references}  # who has a right value; to be higher still is none
-    fine = [m for m in known.values() if converged or m.name in near]
+    right = {*known} if converged else {*task.references}  # of what higher is better nothing is
+    right |= {m.name for m in known.values() if m.better and (m.bounded or m.better == "lower")}
+    fine = [m for m in known.values() if m.name in right]
     if wanted and wanted not in known:
         raise TuningError(str(UnknownMetric(wanted, [m.name for m in fine])))
     if not wanted or known[wanted] not in fine:

@@ -45,11 +45,6 @@ class Runs:
     resumed: Resumed | None = None
     spent: float = 0.0
 
-    @property
-    def jobs(self) -> int:
-        """Repetitions at once."""
-        return self.executor.jobs
-
     def records(self, experiment: Experiment, numbers: Sequence[int]) -> dict[int, Record]:
         """Of these repetitions, by number; without those that were ended because another one ended
         all.
@@ -173,7 +168,7 @@ class Trials:
         """The candidates on the half that they were not chosen on; in turns, so that a machine that
         slows down slows all."""
         found = [Candidate(one.name, one.changes, "held_out") for one in candidates]
-        jobs = self.runs.jobs
+        jobs = self.runs.executor.jobs
         for part in (looks[k : k + jobs] for k in range(0, len(looks), jobs)):
             for one in (*self._finer("held_out"), *found):
                 for _ in self._looks(one, part):
@@ -205,9 +200,10 @@ class Trials:
     def _looks(self, found: Candidate, looks: Sequence[Look]) -> Iterator[Look]:
         """Have a candidate's looks, one after the other."""
         ahead: dict[Look, Record] = {}
+        jobs = self.runs.executor.jobs
         for k, look in enumerate(looks):
             if look not in ahead:
-                batch = [one for one in looks[k : k + self.runs.jobs] if one.task is look.task]
+                batch = [one for one in looks[k : k + jobs] if one.task is look.task]
                 ahead |= self._records(found, batch)
             if look not in ahead:  # another one of them ended all
                 ahead |= self._records(found, [look])

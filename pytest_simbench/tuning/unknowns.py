@@ -24,12 +24,8 @@ OF_BODIES = ("mass", "friction", "linear_damping", "angular_damping")
 """Attributes of bodies. Of links there is a mass, and the friction of all of them."""
 
 OF_JOINTS = {
-    "stiffness": "stiffness",
-    "damping": "damping",
-    "passive_damping": "passive_damping",
-    "joint_friction": "friction",
-    "spring": "spring",
-    "armature": "armature",
+    kind: kind.removeprefix("joint_")
+    for kind in ("stiffness", "damping", "passive_damping", "joint_friction", "spring", "armature")
 }
 """Attributes of joints; the first two are of their drives."""
 

@@ -10,6 +10,7 @@ from pytest_simbench.report.model.document import Column, Section, Table
 ALWAYS = ("rtf", "cpu_cost", "ram")
 """Costs that are shown although they may not have changed, as the study's metrics are."""
 
+UNCLEAR = "no clear change"
 PASSED = "no metric got worse beyond its limit"
 NO_LIMIT = "not significantly more repetitions crashed; no other limit was tested"
 
@@ -41,7 +42,7 @@ def _rows(report: GateReport) -> list[tuple[Change, str]]:
     found += [
         (change, _free(change))
         for change in report.others
-        if _clear(change) or change.metric.study or change.metric.name in ALWAYS
+        if _free(change) != UNCLEAR or change.metric.study or change.metric.name in ALWAYS
     ]
     tests = list(dict.fromkeys(change.test for change, _ in found))
     return sorted(found, key=lambda row: tests.index(row[0].test))
@@ -56,14 +57,10 @@ def _limited(change: Change) -> str:
     return f"passed, limit {limit}"
 
 
-def _clear(change: Change) -> bool:
-    means = change.comparison.first, change.comparison.second
-    return change.significant and change.metric.differs(*means)
-
-
 def _free(change: Change) -> str:
-    if not _clear(change):
-        return "no clear change"
+    means = change.comparison.first, change.comparison.second
+    if not (change.significant and change.metric.differs(*means)):
+        return UNCLEAR
     return "worse" if change.loss > 0 else "better"
 
 
