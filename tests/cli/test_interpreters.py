@@ -13,11 +13,6 @@ from pytest_simbench.cli.values import BadInput
 from tests.plugin.inner import wrapper
 
 
-@pytest.fixture
-def here(tmp_path: Path) -> Path:
-    return tmp_path
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -33,27 +28,27 @@ def here(tmp_path: Path) -> Path:
         ("/dev/null", "the file cannot be executed"),
     ],
 )
-def test_no_interpreter(here: Path, text: str, message: str) -> None:
-    (here / "folder").mkdir()
-    wrapper(here / "venv" / "bin" / "python")
-    wrapper(here / "plain.txt").chmod(0o644)
+def test_no_interpreter(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "folder").mkdir()
+    wrapper(tmp_path / "venv" / "bin" / "python")
+    wrapper(tmp_path / "plain.txt").chmod(0o644)
     with pytest.raises(BadInput, match=f"^--sim-python=x: {message}"):
-        interpreter_path(text, "--sim-python=x", here)
+        interpreter_path(text, "--sim-python=x", tmp_path)
 
 
-def test_paths_become_absolute(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    python = wrapper(here / "a, b" / "bin" / "python")
-    monkeypatch.setenv("HOME", str(here))
+def test_paths_become_absolute(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    python = wrapper(tmp_path / "a, b" / "bin" / "python")
+    monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("PATH", f"{python.parent}:{os.environ['PATH']}")
     for text in (str(python), "a, b/bin/python", "./a, b//bin///python", f"/{python}", "python",
                  "~/a, b/bin/python", "venv/../a, b/bin/python"):  # fmt: skip
-        assert interpreter_path(text, "", here) == str(python)
+        assert interpreter_path(text, "", tmp_path) == str(python)
 
 
-def test_a_link_is_not_followed(here: Path) -> None:
+def test_a_link_is_not_followed(tmp_path: Path) -> None:
     """A virtual environment's interpreter is a link, and knows by its path where it belongs."""
-    (here / "link").symlink_to(sys.executable)
-    assert interpreter_path("./link", "", here) == str(here / "link")
+    (tmp_path / "link").symlink_to(sys.executable)
+    assert interpreter_path("./link", "", tmp_path) == str(tmp_path / "link")
 
 
 def test_a_worker_runs_in_a_folder_of_any_name(pytester: pytest.Pytester) -> None:

@@ -51,10 +51,9 @@ def test_logs_and_traces_are_copied_under_names_of_ours(here: Path) -> None:
         "logs/x-1.log of b",
     ]
     assert [log[-6:] for log in logs] == ["-1.log", "-2.log"]
-    traces = [Path(log.replace("logs", "traces")).with_suffix(".npz") for log in logs]
-    assert [(whole / t).read_text()[-4:] for t in traces] == ["of a", "of b"]
-    videos = [Path(log.replace("logs", "videos")).with_suffix(".mp4") for log in logs]
-    assert [(whole / v).read_text()[-4:] for v in videos] == ["of a", "of b"]
+    for folder, ending in (("traces", ".npz"), ("videos", ".mp4")):
+        copies = [Path(log.replace("logs", folder)).with_suffix(ending) for log in logs]
+        assert [(whole / copy).read_text()[-4:] for copy in copies] == ["of a", "of b"]
 
 
 def test_claims_of_parts_are_not_those_of_the_whole(

@@ -151,12 +151,3 @@ def test_one_that_cannot_be_judged_holds_up_no_other(
     told = capsys.readouterr().out
     assert "sapien could not be judged: no package index tells" in told
     assert "mujoco 4.0.0, after 3.3.7" in told
-
-
-@pytest.mark.parametrize("name", ["ode", "coppeliasim"])
-def test_of_what_no_index_has_nothing_is_watched(
-    name: str, work: list[list[str]], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["watch", name]) == 2
-    assert f"{name}: no package index has its releases; choose from d" in capsys.readouterr().err
-    assert work == []

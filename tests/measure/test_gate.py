@@ -279,15 +279,11 @@ def test_what_cannot_be_compared_is_said() -> None:
 
 def test_what_has_no_limit_is_tested_in_both_directions_and_fails_nothing() -> None:
     """And corrected among itself: a thing that changed shows, whichever way."""
-    baseline = [
-        replace(item, metrics={"placed": 0.5, "hit": 0.0, "landing_x": 1.0})
-        for item in made([0.5] * 20)
-    ]
-    current = [
-        replace(item, metrics={"placed": 0.5, "hit": 1.0, "landing_x": 2.0})
-        for item in made([0.5] * 20)
-    ]
-    report = run(baseline, current, "placed:5%")
+    sides = (
+        [record(k, metrics={"placed": 0.5, "hit": hit, "landing_x": 1.0 + hit}) for k in range(20)]
+        for hit in (0.0, 1.0)
+    )
+    report = run(*sides, "placed:5%")
     assert report.failures == ()
     assert [change.metric.name for change in report.changes] == ["placed", "crashed"]
     costs = ["rtf", "cpu", "ram", "ram_peak", "cpu_cost", "start", "end", "total"]

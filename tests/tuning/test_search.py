@@ -69,13 +69,6 @@ def test_it_goes_on_as_if_it_had_not_been_interrupted(tmp_path: Path) -> None:
     assert {path.read_text() for path in elsewhere.iterdir()} == {"torn"}
 
 
-def test_it_makes_no_more_trials_than_it_may(tmp_path: Path) -> None:
-    pytest.importorskip("optuna")
-    one, executor = search(tmp_path)
-    one.run(1e9, 3)
-    assert {variant for variant, _ in executor.asked} <= {"today", "trial0", "trial1", "trial2"}
-
-
 def test_todays_own_step_is_no_candidate_beside_it(tmp_path: Path) -> None:
     """Values have four digits, and 1/240 s has more."""
     pytest.importorskip("optuna")
@@ -104,11 +97,6 @@ def test_too_little_time(tmp_path: Path) -> None:
     pytest.importorskip("optuna")
     with pytest.raises(TuningError, match="5 s are too few to search: .* took 4 s; .* for each s"):
         search(tmp_path)[0].run(5.0)
-
-
-def test_settings_that_cannot_be_searched() -> None:
-    with pytest.raises(TuningError, match="no setting 'condim' to search; choose from timestep, s"):
-        space_of(BASE, ["condim"], "mujoco")
 
 
 def test_without_optuna(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -38,6 +38,7 @@ def test_laws_are_judged_at_other_parameters() -> None:
     assert len(found.chosen) == len(TIMES) * len(names)
     assert not {*found.chosen} & {*found.judged}
     assert {look.task.name for look in found.judged} <= {look.task.name for look in found.chosen}
+    assert OTHER.keys() <= {law.name for law in LAWS}
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.name)
@@ -47,10 +48,6 @@ def test_a_law_at_other_parameters_is_another(law: Law) -> None:
     if other is not None:
         assert other != law
         other.build()
-
-
-def test_every_name_is_a_laws() -> None:
-    assert OTHER.keys() <= {law.name for law in LAWS}
 
 
 def test_a_task_has_seeds() -> None:
@@ -72,6 +69,8 @@ def test_shares_are_what_is_missing() -> None:
     of = of_falling(2)
     assert of.together({of.chosen[0]: 0.5}, of.chosen) == 0.25
     assert of.together({of.chosen[0]: 0.5}) == 0.5
+    lost = record(metrics={"landed": None})
+    assert of.error(of.chosen[0], lost, lost) == 1.0  # all of it
 
 
 @pytest.mark.parametrize(
@@ -102,11 +101,6 @@ def test_what_has_no_right_value_is_not_tuned_for() -> None:
 
     with pytest.raises(TuningError, match="the right height; .* --error METRIC with landed$"):
         target("t.py::test_it", "cpu_cost", "height", 4, 9, asked=(Lifting(), ()))
-    found = target("t.py::test_it", "cpu_cost", "converged:height", 4, 9, asked=(Lifting(), ()))
-    assert found.metric is height
-    of = replace(of_falling(), metric=LANDED)
-    lost = record(metrics={"landed": None})
-    assert of.error(of.chosen[0], lost, lost) == 1.0  # a proportion cannot be farther off
 
 
 def test_claims_are_of_the_mean() -> None:
@@ -126,13 +120,9 @@ def test_claims_are_of_the_mean() -> None:
     assert error((0.0, 2.0)) == 0.0  # the other one may make up for it
     assert error((None, 2.0), (1.0, 2.0)) > 1e5
     assert (of.laws, of.unit) == (False, "limits")
-
-
-def test_a_limit_of_nought_has_no_unit_of_its_own() -> None:
-    late = Metric("late", "late", unit="s", better="lower", least=0)
-    of = replace(of_falling(1), metric=None, claims=((late, at_most(0.0)),))
+    of = replace(of, claims=((late, at_most(0.0)),))  # a limit of nought is no unit
     one = record(metrics={"late": 0.3})
-    assert of.error(of.chosen[0], one, one) == (0.3,)
+    assert of.error(first, one, one) == (0.3,)
 
 
 def test_measured_data_have_their_halves(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -146,10 +136,6 @@ def test_measured_data_have_their_halves(monkeypatch: pytest.MonkeyPatch) -> Non
     ]
     assert [{number % 2 for _, number in half} for half in halves] == [{0}, {1}]
     assert [len(looks) for looks in (found.chosen, found.judged)] == [5, 6]
-
-
-def test_a_test_on_measured_data_has_the_same_halves() -> None:
-    tosses = Tosses(tuple(Toss(k, np.zeros((2, 13))) for k in range(1, 12)))
     asked = Tossing(tosses), ((Tossing(tosses).metrics[0], at_most(16.0)),)
     found = target("t.py::test_tossing", "cpu_cost", None, 3, 72, asked=asked)
     assert [vars(looks[0].task)["half"] for looks in (found.chosen, found.judged)] == [

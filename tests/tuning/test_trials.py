@@ -35,34 +35,10 @@ def test_a_hopeless_candidate_is_stopped(tmp_path: Path) -> None:
     assert executor.asked.count(("trial2", 4)) == 1
 
 
-def test_a_candidate_that_fails_is_stopped(tmp_path: Path) -> None:
-    looks, executor = trials(tmp_path, lambda s, k: 1.0 if s["timestep"] < 0.004 else None)
-    bad = looks.choose("trial1", {"timestep": 0.004}, [looks.today()])
-    assert bad.ended == "failed: WorkerHung in fall"
-    assert (looks.error(bad), bad.cost()) == (1.0, float("inf"))
-    assert executor.asked[4:] == [("trial1", 1)]
-
-
 def test_failures_that_today_has_too_end_nothing(tmp_path: Path) -> None:
     looks, _ = trials(tmp_path, lambda s, k: None if k == 2 else 1.0)
     found = looks.choose("trial1", {"timestep": 0.004}, [looks.today()])
     assert (found.ended, looks.error(found)) == ("", 0.25)
-
-
-def test_what_is_recorded_is_not_repeated(tmp_path: Path) -> None:
-    looks, _ = trials(tmp_path, lambda s, k: 1.0)
-    looks.judge(looks.today(), looks=looks.target.judged)
-    looks.runs.folder.close()
-    again, executor = trials(tmp_path, lambda s, k: 0.0)
-    today = again.today()
-    (judged,) = again.judge(today, looks=again.target.judged)
-    assert (again.error(today), again.error(judged), executor.asked) == (0.0, 0.0, [])
-
-
-def test_settings_that_never_work_cannot_be_judged(tmp_path: Path) -> None:
-    looks, _ = trials(tmp_path, lambda s, k: None)
-    with pytest.raises(TuningError, match="today's settings cannot be judged: it hangs"):
-        looks.today()
 
 
 @pytest.mark.parametrize("jobs", [1, 3, 16])
@@ -81,6 +57,7 @@ def test_the_number_of_jobs_changes_nothing(tmp_path: Path, jobs: int) -> None:
     bad = looks.choose("trial2", {"timestep": 0.004}, [today])
     assert (dear.ended, looks.error(dear)) == ("hopeless after 2 of 4", 0.5)
     assert (bad.ended, looks.error(bad)) == ("failed: WorkerHung in fall", 1.0)
+    assert bad.cost() == float("inf")
     (judged,) = looks.judge(dear, looks=looks.target.judged)
     assert looks.error(judged) == pytest.approx(1.5 / 6)
     assert len(executor.asked) == len({*executor.asked})
@@ -103,10 +80,19 @@ def test_what_a_smaller_step_gives_is_right(tmp_path: Path) -> None:
     assert {("converged-held_out", 6), ("today-held_out", 6)} < {*executor.asked}
 
 
-@pytest.mark.parametrize(("score", "why"), [(None, "it hangs"), (float("nan"), "none has a cost")])
-def test_a_smaller_step_that_never_works(tmp_path: Path, score: float | None, why: str) -> None:
-    """Where it has no value each candidate would be right, and the cheapest recommended."""
-    of = replace(target(), converged=True)
-    looks, _ = trials(tmp_path, lambda s, k: score if s["timestep"] < 0.001 else 1.0, of)
-    with pytest.raises(TuningError, match=f"8 times as many steps cannot be judged: {why}"):
+@pytest.mark.parametrize(
+    ("converged", "score", "why"),
+    [
+        (False, None, "today's settings cannot be judged: it hangs"),
+        (True, None, "8 times as many steps cannot be judged: it hangs"),
+        (True, float("nan"), "8 times as many steps cannot be judged: none has a cost"),
+    ],
+)
+def test_what_never_works_cannot_be_judged(
+    tmp_path: Path, converged: bool, score: float | None, why: str
+) -> None:
+    """Where a smaller step has no value each candidate would be right, and the cheapest taken."""
+    of, longest = replace(target(), converged=converged), 0.001 if converged else 1.0
+    looks, _ = trials(tmp_path, lambda s, k: score if s["timestep"] < longest else 1.0, of)
+    with pytest.raises(TuningError, match=why):
         looks.today()
