@@ -92,6 +92,7 @@ class Search:
         today = self.trials.today()
         self.done = [today]
         took = sum(record.cost("total") or 0.0 for record in today.records.values())
+        took /= self.trials.runs.executor.jobs  # they were had at once
         if seconds < FEWEST * took and most is None:
             raise TuningError(
                 f"{seconds:.0f} s are too few to search: today's settings alone took {took:.0f} s; "

@@ -93,10 +93,13 @@ def test_a_setting_that_does_not_act_is_not_asked_for(tmp_path: Path) -> None:
         assert ("stiction_tolerance" in asked) == (asked["approximation"] != "sap")
 
 
-def test_too_little_time(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("jobs", "took"), [(1, 4), (4, 1)])
+def test_too_little_time(tmp_path: Path, jobs: int, took: int) -> None:
     pytest.importorskip("optuna")
-    with pytest.raises(TuningError, match="5 s are too few to search: .* took 4 s; .* for each s"):
-        search(tmp_path)[0].run(5.0)
+    one, executor = search(tmp_path)
+    executor.jobs = jobs
+    with pytest.raises(TuningError, match=f"2 s are too few .* took {took} s; .* for each sim"):
+        one.run(2.0)
 
 
 def test_without_optuna(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
