@@ -179,9 +179,8 @@ def _changed(course: MetricCourse, rows: int, history: TaskHistory) -> MetricCou
     found = steps(present) if sole else change_points(present, rows=rows)
     if course.metric.name in COSTS:
         found = [c for c in found if abs(c.after - c.before) > SMALLEST * abs(c.before)]
-    return replace(
-        course, changes=tuple(c for c in found if course.metric.differs(c.before, c.after))
-    )
+    found = [c for c in found if course.metric.differs(c.before, c.after)]
+    return replace(course, changes=tuple(found))
 
 
 @dataclass(frozen=True)

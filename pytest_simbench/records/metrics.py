@@ -112,8 +112,7 @@ class Metric:
         return RESOLUTIONS.get(self.unit, 0.0) if self.kind == "value" else 0.0
 
     def differs(self, before: float, after: float) -> bool:
-        """Whether two means differ by what means anything, and in the three digits that a reader
-        sees: a deterministic engine's rounding is significant too."""
+        """Whether two means differ by what means anything (`RESOLUTIONS`), and a reader sees it."""
         shown = self.format(before) != self.format(after)
         return shown and abs(after - before) >= self.smallest_difference
 

@@ -83,14 +83,12 @@ def read_profile(path: str | Path) -> ProfileFile:
         raise SettingsError(
             f"{path}: {unknown[0]!r:.60} means nothing here; choose from {', '.join(KEYS)}"
         )
-    texts = data.get("simulator"), data.get("base", "default")
-    tables = data.get("settings", {}), data.get("chosen", {})
-    simulator, base = texts
+    simulator, base = data.get("simulator"), data.get("base", "default")
+    changes, chosen = data.get("settings", {}), data.get("chosen", {})
     if not (isinstance(simulator, str) and isinstance(base, str)):
         raise SettingsError(f"{path}: give texts: simulator = NAME, and base = PROFILE if need be")
-    if not all(isinstance(table, dict) for table in tables):
+    if not (isinstance(changes, dict) and isinstance(chosen, dict)):
         raise SettingsError(f"{path}: settings and chosen are tables, [settings] and [chosen]")
-    changes, chosen = tables
     seeds = chosen.get("seeds", [])
     try:
         seen = tuple(

@@ -106,8 +106,7 @@ def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
         mean, low, high = (math.exp(value) for value in (of.mean, of.low, of.high))
         cheaper = Interval(mean, low, high, of.n, of.method)
     if target.metric is None:
-        of_kind = _of_laws if target.laws else _of_claims
-        verdict, reason = of_kind(target, looks, today, found)
+        verdict, reason = (_of_laws if target.laws else _of_claims)(target, looks, today, found)
         return Judgement(verdict, before, after, None, cheaper, reason)
     more = [found.errors[look] - today.errors[look] for look in looks]
     bound = _difference(more, target.metric.bounded)

@@ -7,6 +7,7 @@ trials again; what is recorded it does not repeat, and then goes on as it would 
 from __future__ import annotations
 
 import json
+import math
 import time
 import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -81,8 +82,8 @@ class Search:
     done: list[Candidate] = field(default_factory=list)
 
     def run(self, seconds: float, most: int | None = None) -> list[Candidate]:
-        """Search for so long, or until there are so many trials; those of an earlier call count.
-        The first of the candidates are today's settings.
+        """Search for so long, or until there are so many trials, those of an earlier call count, or
+        no other values. The first of the candidates are today's settings.
 
         Raises:
             TuningError: no Optuna, nothing that runs, or too little time.
@@ -99,9 +100,12 @@ class Search:
                 f"give a budget of at least {1 + 4 * took / 60:.0f}min for each simulator"
             )
         study = self._study(library)
-        known = {self._key({}): today}
-        number = 0
-        while time.monotonic() - began + self.trials.runs.spent < seconds and number != most:
+        known, number = {self._key({}): today}, 0
+        choices = [len(one.over) for one in self.space if isinstance(one.over, tuple)]
+        every = math.prod(choices) if len(choices) == len(self.space) else math.inf
+        while number != most and len(known) < every:
+            if time.monotonic() - began + self.trials.runs.spent >= seconds:
+                break
             if number % 2 and number == len(study.trials):
                 study.enqueue_trial(self._step(number, known))
             trial = self._trial(library, study, number)

@@ -57,13 +57,13 @@ def between(value: float, end: float, one: Searched, share: float = 1 / 2) -> fl
 
 
 def corners(space: Sequence[Searched], rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Rows of ends, middles and choices; each pair of two settings' values is in one of them."""
+    """Rows of ends, middles and choices; each pair of settings meets in each way in one of them."""
     levels = {one.name: _levels(one) for one in space}
     left = [
         ((a, x), (b, y))
         for a, b in itertools.combinations(levels, 2) for x in levels[a] for y in levels[b]
     ]  # fmt: skip
-    rows: list[dict[str, Any]] = []
+    rows = [{name: x} for name, of in levels.items() for x in of] if len(levels) == 1 else []
     while left:
         drawn = [
             {name: of[int(rng.integers(len(of)))] for name, of in levels.items()} | dict(left[0])

@@ -159,8 +159,7 @@ class Trials:
                 found.ended = f"failed: {error.cause if error else 'for no known reason'}"
                 return found
             if len(found.records) < len(self.target.chosen) and self._hopeless(found, done):
-                many = f"{len(found.records)} of {len(self.target.chosen)}"
-                found.ended = f"hopeless after {many}"
+                found.ended = f"hopeless after {len(found.records)} of {len(self.target.chosen)}"
                 return found
         return found
 

@@ -297,14 +297,6 @@ def test_what_has_no_limit_is_tested_in_both_directions_and_fails_nothing() -> N
     assert not any(change.normalised for change in report.others)
 
 
-def test_one_comparison_more_makes_each_less_sure() -> None:
-    """Holm's correction, over all limits of all tests."""
-    one = run(made([1.0] * 8), made([0.5] * 8), "placed:5%").changes[0]
-    both = run(made([1.0] * 8), made([0.5] * 8), "placed:5%,ram:10%").changes[0]
-    assert one.p_value == one.comparison.p_value == pytest.approx(1 / 2**8)
-    assert both.p_value == pytest.approx(2 / 2**8)
-
-
 def test_what_is_certain_and_what_nothing_can_show_make_nothing_less_sure() -> None:
     """82 laws, each asked once, hid what a task beside them had lost."""
     laws = [

@@ -25,9 +25,11 @@ def score(settings: Any, number: int) -> float:
     return float(settings["timestep"] <= 0.004 and settings["cone"] == "elliptic")
 
 
-def search(folder: Path, score: Score = score, seed: int = 1) -> tuple[Search, Scored]:
+def search(
+    folder: Path, score: Score = score, seed: int = 1, over: str = "timestep cone"
+) -> tuple[Search, Scored]:
     looks, executor = trials(folder, score)
-    space = space_of(BASE, ["timestep", "cone"], "mujoco")
+    space = space_of(BASE, over.split(), "mujoco")
     return Search(looks, BASE, space, seed, lambda one, best: None), executor
 
 
@@ -67,6 +69,13 @@ def test_it_goes_on_as_if_it_had_not_been_interrupted(tmp_path: Path) -> None:
     kept = first.asked[:-1]  # the last one was under way
     assert not {*kept} & {*second.asked}
     assert {path.read_text() for path in elsewhere.iterdir()} == {"torn"}
+
+
+def test_one_setting_may_be_searched_alone(tmp_path: Path) -> None:
+    """One of two values ends at once."""
+    pytest.importorskip("optuna")
+    assert len(search(tmp_path / "a", over="cone")[0].run(1e9)) == 2
+    assert len(search(tmp_path / "b", over="timestep")[0].run(1e9, 12)) > 8
 
 
 def test_todays_own_step_is_no_candidate_beside_it(tmp_path: Path) -> None:
