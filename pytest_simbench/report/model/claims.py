@@ -26,6 +26,8 @@ Metrics = Mapping[str, Sequence[Metric]]
 
 NO_CLAIM = "no claim was judged"
 
+ONE_SIDED = "A claim has one side, and so have its bounds: those of other tables are wider."
+
 
 @dataclass(frozen=True)
 class Trouble:
@@ -184,7 +186,7 @@ def _table(told: Sequence[_Told]) -> Table:
     for place, name in who.items():
         cells = [_cell([one for at, one in row if at == place]) for row in rows.values()]
         found.append(Column(name, cells, left=True))
-    return Table("Claims", found)
+    return Table("Claims", found, ONE_SIDED if any("[" in one.value for one in told) else "")
 
 
 def _cell(told: Sequence[_Told]) -> str:

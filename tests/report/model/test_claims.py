@@ -85,6 +85,7 @@ def test_a_limit_against_the_baseline_that_is_exceeded_is_a_claim_that_fails() -
 
 def test_the_table_has_a_column_for_each_simulator_and_a_row_for_each_claim() -> None:
     shown = claim_lines(claims_of(reading(claim(low=0.83, high=1.0), FAILED)), 80)
+    assert "those of other tables are wider" in shown
     row = next(line for line in shown.splitlines() if line.startswith("test_stacking"))
     assert row.split("  ") == ["test_stacking: placed >= 90 %", "PASS 100 [83, 100]",
                                "FAIL 50 [30, 70]"]  # fmt: skip
