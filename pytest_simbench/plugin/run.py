@@ -300,9 +300,8 @@ class Run:
         if not self.reading.records and not (self.folder.path / NAME).is_file():
             return
         path, records = self.folder.path, self.reading.records
-        recorded: list[str] = []
-        if options.value(self.config, recording.RECORD):
-            recorded = runs.recordings(path, path, records, self.progress)
+        wanted = options.value(self.config, recording.RECORD)
+        made = runs.recordings(path, path, records, self.progress) if wanted else ([], True)
         found = comparison.found if comparison else None
         looks = looks_at(path, self.resumed.records if self.resumed else (), records)
         written = write_files(path, Report.of(self.reading, found, looks))
@@ -321,8 +320,9 @@ class Run:
         lost = [write_outcome(path, RunOutcome(passed, found, looks))]
         if badge := options.value(self.config, "sim_badge"):
             lost.append(write_badge(Path(badge), records, passed))
-        self.unwritten = not written.complete or any([*unsaved, *lost, *self.told.values()])
-        problems += [*lost, *recorded]
+        whole = written.complete and made[1] and not unsaved
+        self.unwritten = not whole or any([*lost, *self.told.values()])
+        problems += [*lost, *made[0]]
         if written.complete and not unsaved:
             self.page = path / PAGE_NAME
         else:
