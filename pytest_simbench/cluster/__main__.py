@@ -155,8 +155,9 @@ async def _node(given: argparse.Namespace) -> int:
     head = get_address_host(resolve_address(given.address))
     logging.getLogger("distributed.nanny").setLevel(logging.CRITICAL)  # what it logs is told below
     told = _told()
-    while not told.is_set():
-        nanny = Nanny(
+
+    async def serve() -> None:
+        async with Nanny(
             given.address,
             host=given.host or (LOOPBACK if head.startswith("127.") else get_ip(head)),
             name=given.name,
@@ -164,12 +165,14 @@ async def _node(given: argparse.Namespace) -> int:
             resources=offers,
             memory_limit=0,
             dashboard=False,
-        )
+        ) as nanny:
+            node = Node.of(nanny.worker_address or "", given.name, offers)
+            print(f"{node}; {given.slots} at once; it serves {given.address}", flush=True)
+            await nanny.finished()
+
+    while not told.is_set():
         try:
-            async with nanny:
-                node = Node.of(nanny.worker_address or "", given.name, offers)
-                print(f"{node}; {given.slots} at once; it serves {given.address}", flush=True)
-                await _either(nanny.finished, told)
+            await _either(serve, told)
         except (OSError, RuntimeError, TimeoutError, ValueError) as error:
             print(not_taken(given, error), flush=True)
         if not told.is_set():

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
 import threading
+import time
 from argparse import Namespace
 from collections.abc import Iterable
 from pathlib import Path
@@ -162,6 +164,20 @@ def test_what_cannot_begin_says_so(
         port = taken.getsockname()[1]
         assert main(words.format(port).split()) == 2
     assert told.format(port) in capsys.readouterr().err
+
+
+def test_a_node_that_looks_for_its_head_ends_when_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask looks for half a minute."""
+
+    def soon() -> asyncio.Event:
+        told = asyncio.Event()
+        asyncio.get_running_loop().call_later(0.5, told.set)
+        return told
+
+    monkeypatch.setattr("pytest_simbench.cluster.__main__._told", soon)
+    began = time.monotonic()
+    assert main(["node", "tcp://127.0.0.1:1", "--sim", "mujoco"]) == 0
+    assert time.monotonic() - began < 20
 
 
 def test_a_node_whose_name_is_taken_is_told_to_take_another() -> None:
