@@ -23,12 +23,9 @@ from tests.worker.hosted import Hosted
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5), mass=0.1)
 SCENE = Scene("one", (CUBE,))
 CONSTRUCT = {
-    "adapter": "tests.worker.hosted:Hosted",
-    "profile": "tuned",
-    "changes": {},
-    "gui": False,
+    "adapter": "tests.worker.hosted:Hosted", "profile": "tuned", "changes": {}, "gui": False,
     "real_time": False,
-}
+}  # fmt: skip
 
 
 class Asked:
@@ -69,14 +66,9 @@ class Asked:
 
 @pytest.fixture
 def ask(monkeypatch: pytest.MonkeyPatch) -> Iterator[Asked]:
-    for name, value in {
-        "calls": [],
-        "instances": [],
-        "raises": [],
-        "built": {},
-        "touching": [],
-    }.items():
-        monkeypatch.setattr(Hosted, name, value)
+    monkeypatch.setattr(Hosted, "built", {})
+    for name in ("calls", "instances", "raises", "touching"):
+        monkeypatch.setattr(Hosted, name, [])
     for variable in Hosted.info.environment:
         monkeypatch.delenv(variable, raising=False)
     yield Asked()
@@ -112,11 +104,13 @@ def test_an_adapter_gets_its_settings(ask: Asked) -> None:
     assert (kind, message[:31]) == ("SettingsError", "hosted has no setting 'speed'; ")
 
 
-def test_a_window_is_the_users_and_gets_no_variables(ask: Asked) -> None:
+def test_a_window_shows_the_world_and_gets_no_variables(ask: Asked) -> None:
     os.environ["HOSTED_KEPT"] = "user's"
     ask.construct(gui=True)
     assert Hosted.instances[0].gui
     assert "HOSTED_SET" not in os.environ
+    ask.load()
+    assert Hosted.calls == [("load", "one"), "picture"]
     ask.construct()
     assert (os.environ["HOSTED_SET"], os.environ["HOSTED_KEPT"]) == ("ours", "user's")
 
@@ -174,21 +168,15 @@ def test_a_loaded_world(ask: Asked) -> None:
     assert state["bodies"].tolist() == answer["bodies"].tolist()
 
 
-def test_a_window_shows_the_loaded_world(ask: Asked) -> None:
-    ask.construct(gui=True)
-    ask.load()
-    assert Hosted.calls == [("load", "one"), "picture"]
-
-
 def test_what_was_built_is_held_against_the_scene(ask: Asked) -> None:
     ask.construct()
     Hosted.built.update({"body/cube/margin": None})
     assert ask.load()["excused"] == ["body/*/margin: has margins (not told by the engine)"]
     Hosted.built.update({"body/cube/mass": 0.2})
-    kind, message = ask.error("load", scene=SCENE.to_wire(), parity=True)
-    assert kind == "ParityError"
-    assert message == (
-        "hosted built another world than the scene describes: body/cube/mass: scene 0.1, hosted 0.2"
+    assert ask.error("load", scene=SCENE.to_wire(), parity=True) == (
+        "ParityError",
+        "hosted built another world than the scene describes: body/cube/mass: scene 0.1, "
+        "hosted 0.2",
     )
     assert ask.load(parity=False)["excused"] == []
 
@@ -242,10 +230,9 @@ def test_waiting_and_following(loaded: Asked) -> None:
 
 def test_a_log_that_is_none_is_found(loaded: Asked, monkeypatch: Any) -> None:
     monkeypatch.setattr(Hosted, "joint_state", lambda self: np.zeros((2, 1)))
-    kind, message = loaded.error("wait", duration=0.04, log_period=0.02)
-    assert kind == "StateError"
-    assert message == (
-        "hosted: joint_state() must be an array of float64 (2, 0), not float64 (2, 1)"
+    assert loaded.error("wait", duration=0.04, log_period=0.02) == (
+        "StateError",
+        "hosted: joint_state() must be an array of float64 (2, 0), not float64 (2, 1)",
     )
 
 
@@ -302,13 +289,11 @@ def test_statistics(ask: Asked) -> None:
     assert 10 < stats["peak_rss_mb"] < 100_000
 
 
-def test_it_waits_for_the_wall_clock_where_asked(ask: Asked) -> None:
-    ask.construct(real_time=True)
+@pytest.mark.parametrize("real_time", [True, False])
+def test_it_waits_for_the_wall_clock_where_asked(ask: Asked, real_time: bool) -> None:
+    ask.construct(real_time=real_time)
     ask.load()
-    assert ask.server.stepper.real_time is True
-    ask.construct()
-    ask.load()
-    assert ask.server.stepper.real_time is False
+    assert ask.server.stepper.real_time is real_time
 
 
 def test_signs_of_life(loaded: Asked, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,6 +30,7 @@ def render_run(report: Report, pictures: Sequence[str] = ()) -> str:
 def render_claims(found: Claims) -> str:
     """Pass or fail, and why."""
     parts = [f"**{for_markdown(found.sentence)}**", table(found.table.columns)]
+    parts.append(for_markdown(found.table.note))
     for trouble in found.troubles:
         told = [f"- {for_markdown(trouble.what)}"]
         told += [f"  worst: {for_markdown(trouble.worst)}"] if trouble.worst else []

@@ -26,6 +26,8 @@ Metrics = Mapping[str, Sequence[Metric]]
 
 NO_CLAIM = "no claim was judged"
 
+ONE_SIDED = "A claim has one side, and so have its bounds: those of other tables are wider."
+
 
 @dataclass(frozen=True)
 class Trouble:
@@ -171,19 +173,20 @@ def _sentence(state: str, count: Counter[str], records: Sequence[Record]) -> str
 
 
 def _table(told: Sequence[_Told]) -> Table:
-    """A row for each subject and claim, a column for each simulator; several tests in one cell are
-    counted."""
+    """A row for each subject and claim, those that fail first, a column for each simulator; several
+    tests in one cell are counted."""
     if not told:
         return Table("Claims", [])
     of = [(one.claim.simulator, one.claim.mode, one.claim.profile) for one in told]
     places = list(dict.fromkeys(of))
     who = dict(zip(places, names(places, "{} {}", " "), strict=True))
-    rows = grouped(zip(of, told, strict=True), lambda pair: (pair[1].subject, pair[1].claimed))
+    failing = sorted(zip(of, told, strict=True), key=lambda pair: pair[1].claim.verdict != "FAIL")
+    rows = grouped(failing, lambda pair: (pair[1].subject, pair[1].claimed))
     found = [Column("claim", [f"{subject}: {text}" for subject, text in rows], left=True)]
     for place, name in who.items():
         cells = [_cell([one for at, one in row if at == place]) for row in rows.values()]
         found.append(Column(name, cells, left=True))
-    return Table("Claims", found)
+    return Table("Claims", found, ONE_SIDED if any("[" in one.value for one in told) else "")
 
 
 def _cell(told: Sequence[_Told]) -> str:
@@ -191,7 +194,7 @@ def _cell(told: Sequence[_Told]) -> str:
     if len(told) == 1:
         return f"{told[0].claim.verdict} {told[0].value}".rstrip()
     count = Counter[str](one.claim.verdict for one in told)
-    return ", ".join(f"{verdict} {count[verdict]}" for verdict in ORDER if count[verdict])
+    return ", ".join(f"{count[verdict]} {verdict}" for verdict in ORDER if count[verdict])
 
 
 def _trouble(told: _Told, records: Sequence[Record]) -> Trouble:

@@ -21,6 +21,7 @@ def claim_lines(found: Claims, width: int) -> str:
     """The claims, as lines of at most `width` columns, but for commands."""
     columns = found.table.columns
     parts = [fill(found.sentence, width), render(columns, width) if columns else ""]
+    parts.append(fill(found.table.note, width))
     for trouble in found.troubles:
         told = [fill(trouble.what, width, "  ")]
         told += [fill(f"  worst: {trouble.worst}", width, "  ")] if trouble.worst else []

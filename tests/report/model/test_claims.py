@@ -85,6 +85,7 @@ def test_a_limit_against_the_baseline_that_is_exceeded_is_a_claim_that_fails() -
 
 def test_the_table_has_a_column_for_each_simulator_and_a_row_for_each_claim() -> None:
     shown = claim_lines(claims_of(reading(claim(low=0.83, high=1.0), FAILED)), 80)
+    assert "those of other tables are wider" in shown
     row = next(line for line in shown.splitlines() if line.startswith("test_stacking"))
     assert row.split("  ") == ["test_stacking: placed >= 90 %", "PASS 100 [83, 100]",
                                "FAIL 50 [30, 70]"]  # fmt: skip
@@ -140,8 +141,9 @@ def test_a_test_that_failed_as_a_whole_is_told_unless_a_claim_of_it_says_why() -
 def test_many_variants_of_a_test_are_counted_in_one_cell() -> None:
     laws = [claim(test=f"{STACK}[{k}]", variant=f"law{k}") for k in range(9)]
     laws.append(claim(test=f"{STACK}[x]", variant="x", verdict="FAIL"))
-    shown = claim_lines(claims_of(reading(*laws)), 80)
-    assert "FAIL 1, PASS 9" in shown
+    whole = claims_of(reading(claim(function="test_other"), *laws))
+    assert "1 FAIL, 9 PASS" in claim_lines(whole, 80)
+    assert whole.table.columns[0].cells[0].text.startswith("test_stacking")  # what failed is first
 
 
 @pytest.mark.parametrize("width", [80, 200])
