@@ -194,14 +194,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     functions = {command.name: command.function for command in COMMANDS}
     name = words[0] if words else ""
-    if functions.get(name, "").endswith(":main"):
-        return int(_function(functions[name])(words[1:]) or 0)
-    top = parser()
-    given = vars(top.parse_args(words))
-    if given.pop("command") is None:
-        top.print_help(sys.stderr)
-        return BAD_INPUT
     try:
+        if functions.get(name, "").endswith(":main"):
+            return int(_function(functions[name])(words[1:]) or 0)
+        top = parser()
+        given = vars(top.parse_args(words))
+        if given.pop("command") is None:
+            top.print_help(sys.stderr)
+            return BAD_INPUT
         status = int(_function(functions[name])(**given))
         sys.stdout.flush()
         return status

@@ -215,30 +215,32 @@ def _show(
     recordings of the motions, where they are wanted; and print tables and problems."""
     report = Report.of(reading, outcome.compared, outcome.looks)
     written = Written(**vars(report)) if target is None else write_files(target, report, run)
-    problems += written.problems
-    if badge and (lost := write_badge(Path(badge), reading.records, outcome.passed)):
-        problems.append(lost)
-        written = replace(written, complete=False)
+    lost = write_badge(Path(badge), reading.records, outcome.passed) if badge else ""
+    problems += [*written.problems, lost]
+    complete = written.complete and not lost
     if record and run is not None and target is not None:
-        problems += recordings(run, target, reading.records)
+        told, recorded = recordings(run, target, reading.records)
+        problems += told
+        complete &= recorded
     elif record:
         problems.append("no recordings: join the runs with simbench merge first")
     print(text_of(written, shutil.get_terminal_size().columns, verbose))
     for problem in filter(None, problems):
         print(for_terminal(problem))
-    return written
+    return replace(written, complete=complete)
 
 
 def recordings(
     run: Path, target: Path, records: Sequence[Record], progress: Progress | None = None
-) -> list[str]:
+) -> tuple[list[str], bool]:
     """Write the motions of a run, whose folder holds the traces, as rosbag2 folders into another
-    one; lines for the terminal. Without a live line there is one on standard output."""
+    one; lines for the terminal, and whether every trace has one. Without a live line there is one
+    on standard output."""
     count, problems = write_bags(run, target, records, progress or printed())
+    many = f"{count} recording{'s' if count > 1 else ''}: {shown(target / FOLDER, Path.cwd())}"
     if not count:
-        return [*problems, "no recordings: the run has no traces; see --sim-trace"]
-    many = f"{count} recording{'s' if count > 1 else ''}"
-    return [*problems, f"{many}: {shown(target / FOLDER, Path.cwd())}"]
+        many = "" if problems else "no recordings: the run has no traces; see --sim-trace"
+    return [*problems, many], not problems
 
 
 def printed(quiet: bool = False) -> Progress:

@@ -43,9 +43,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     try:
         return int(asyncio.run(given.run(given)))
-    except (SimulatorError, OSError, ValueError, RuntimeError, TimeoutError) as error:
-        print(f"ERROR: {_reason(error)}", file=sys.stderr)
-        return 1
+    except (SimulatorError, ValueError) as error:
+        told = _reason(error)
+    except (OSError, RuntimeError) as error:
+        told = given.failing.format(given, _reason(error))
+    print(f"ERROR: {told}", file=sys.stderr)
+    return 2
 
 
 def _reason(error: BaseException) -> str:
@@ -78,7 +81,8 @@ def _parser() -> argparse.ArgumentParser:
     head.add_argument(
         "--pages", action="store_true", help="serve Dask's pages, to whoever reaches this machine"
     )
-    head.set_defaults(run=_head)
+    advice = "the head cannot listen on {0.host}:{0.port} ({1}); give another --host or --port"
+    head.set_defaults(run=_head, failing=advice)
     node = kinds.add_parser("node", help="a machine that carries repetitions out")
     node.add_argument("address", help="of the head: tcp://head:8786, or tls://head:8786")
     node.add_argument("--host", help="address to listen on (default: the one that faces the head)")
@@ -95,7 +99,7 @@ def _parser() -> argparse.ArgumentParser:
     node.add_argument(
         "--sim", help="simulators to offer, with commas (default: all that are ready here)"
     )
-    node.set_defaults(run=_node)
+    node.set_defaults(run=_node, failing="no node for a head at {0.address}: {1}")
     return parser
 
 
@@ -103,8 +107,10 @@ async def _head(given: argparse.Namespace) -> int:
     import dask
     from distributed import Scheduler
 
-    if given.lost_after < 1.0:
-        raise ValueError("--lost-after: give at least 1 second")
+    if not 1.0 <= given.lost_after <= 1e6:
+        raise ValueError("--lost-after: give 1 to 1000000 seconds")
+    if not 0 <= given.port < 2**16:
+        raise ValueError("--port: give a whole number from 0, for any that is free, to 65535")
     if not given.pages:
         dask.config.set({"distributed.scheduler.http.routes": []})
     dask.config.set(
@@ -149,8 +155,9 @@ async def _node(given: argparse.Namespace) -> int:
     head = get_address_host(resolve_address(given.address))
     logging.getLogger("distributed.nanny").setLevel(logging.CRITICAL)  # what it logs is told below
     told = _told()
-    while not told.is_set():
-        nanny = Nanny(
+
+    async def serve() -> None:
+        async with Nanny(
             given.address,
             host=given.host or (LOOPBACK if head.startswith("127.") else get_ip(head)),
             name=given.name,
@@ -158,12 +165,14 @@ async def _node(given: argparse.Namespace) -> int:
             resources=offers,
             memory_limit=0,
             dashboard=False,
-        )
+        ) as nanny:
+            node = Node.of(nanny.worker_address or "", given.name, offers)
+            print(f"{node}; {given.slots} at once; it serves {given.address}", flush=True)
+            await nanny.finished()
+
+    while not told.is_set():
         try:
-            async with nanny:
-                node = Node.of(nanny.worker_address or "", given.name, offers)
-                print(f"{node}; {given.slots} at once; it serves {given.address}", flush=True)
-                await _either(nanny.finished, told)
+            await _either(serve, told)
         except (OSError, RuntimeError, TimeoutError, ValueError) as error:
             print(not_taken(given, error), flush=True)
         if not told.is_set():

@@ -12,7 +12,7 @@ from typing import Any
 from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.errors import DisplayError, DisplayLost, Where, WorkerError
 from pytest_simbench.client.process import WorkerProcess
-from pytest_simbench.client.tape import TapedWorld
+from pytest_simbench.client.tape import Operation, TapedWorld
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.example import replay_command, write_example
 from pytest_simbench.records.series import short
@@ -35,11 +35,13 @@ class SimulatorHandle:
 
     Attributes:
         constructed: the simulator that the worker made last.
+        tape: of the last episode, see `TapedWorld`.
     """
 
     def __init__(self, case: Case) -> None:
         self.case = case
         self.constructed = Constructed()
+        self.tape: list[Operation] = []
         self._process: WorkerProcess | None = None
         self._open = False
 
@@ -61,16 +63,16 @@ class SimulatorHandle:
                 "leave its `with` block first"
             )
         self._open = True
-        tape: list[Any] = []
+        self.tape = []
         try:
             world = self.world(scene, **options)
-            tape = world.tape
+            self.tape = world.tape
             yield world
         except BaseException as error:
             if isinstance(error, WorkerError) or (self._process and self._process.busy):
                 self.close()  # dead, or with an answer under way that nobody waits for
             if isinstance(error, Exception) and not _of_hypothesis(error):
-                self._keep_example(error, scene, tape)
+                self._keep_example(error, scene)
             raise
         finally:
             self._open = False
@@ -90,13 +92,13 @@ class SimulatorHandle:
         self.constructed = self._process.construct(case.base, case.changes, gui=case.mode == "gui")
         return TapedWorld(self._process, scene, **options)
 
-    def _keep_example(self, error: Exception, scene: Scene, tape: list[Any]) -> None:
+    def _keep_example(self, error: Exception, scene: Scene) -> None:
         """Write the failing episode to the run folder."""
         case = self.case
         test = os.environ.get("PYTEST_CURRENT_TEST", case.short_name).rpartition(" ")[0]
         name = f"{short(test) or 'episode'}-{case.simulator}-{case.mode}"
         with suppress(OSError):  # a full disk must not hide the failure itself
-            path = write_example(case, name, scene, tape, self.constructed.versions)
+            path = write_example(case, name, scene, self.tape, self.constructed.versions)
             error.add_note(f"replay this episode: {replay_command(path, case, scene)}")
 
     def close(self) -> None:

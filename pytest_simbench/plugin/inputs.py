@@ -83,7 +83,7 @@ class SceneFiles:
 
     request: pytest.FixtureRequest
     folder: Path
-    tell: Callable[[str], None]
+    tell: Callable[..., None]
 
     def log(self, path: str | Path, scene: Scene) -> Log:
         """The log of a file that drives of a scene follow, see `recordings.logs`."""
@@ -130,7 +130,8 @@ class SceneFiles:
         try:
             keep(self.folder, at.name, found.account)
         except OSError as error:
-            self.tell(f"{self.folder / PAGE} could not be written ({error.strerror or error})")
+            lost = f"{self.folder / PAGE} could not be written ({error.strerror or error})"
+            self.tell(lost, unwritten=True)
         for line in terminal_lines(found.account):
             self.tell(f"{at.name}: {line} ({PAGE})")
         return scene

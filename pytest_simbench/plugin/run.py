@@ -54,13 +54,14 @@ class Run:
         failing: whether a test of the resumed run that did not run again had failed.
         page: to look at, once the whole report is written.
         unwritten: whether a file, the badge among them, could not be written.
+        told: sentences for the end of the run; True where one is of a file that was not written.
         expected: what later tests will ask for; set before the first one asks.
     """
 
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
         self._shared_by: dict[str, Any] | None = getattr(config, "workerinput", None)
-        self._problems: list[str] = []
+        self.told: dict[str, bool] = {}
         self.folder = RunFolder(self._choose_path())
         self.problem: str = (self._shared_by or {}).get("simbench_problem", "")
         self.displays = Displays()
@@ -120,7 +121,7 @@ class Run:
         if self._shared_by is not None:
             return
         if self.resumed is not None:
-            self._problems += self.resumed.repair()
+            self.told |= dict.fromkeys(self.resumed.repair(), False)
         elif self.folder.holds_run:
             self.folder.release()
             raise pytest.UsageError(self.occupied())
@@ -245,10 +246,10 @@ class Run:
             if self.mistake:
                 session.exitstatus = pytest.ExitCode.USAGE_ERROR
 
-    def tell(self, problem: str) -> None:
+    def tell(self, problem: str, *, unwritten: bool = False) -> None:
         """A sentence for the end of the run."""
-        if problem and problem not in self._problems:
-            self._problems.append(problem)
+        if problem:
+            self.told[problem] = unwritten
 
     def tell_how_to_go_on(self) -> None:
         """What completes a run that was interrupted."""
@@ -299,14 +300,13 @@ class Run:
         if not self.reading.records and not (self.folder.path / NAME).is_file():
             return
         path, records = self.folder.path, self.reading.records
-        recorded: list[str] = []
-        if options.value(self.config, recording.RECORD):
-            recorded = runs.recordings(path, path, records, self.progress)
+        wanted = options.value(self.config, recording.RECORD)
+        made = runs.recordings(path, path, records, self.progress) if wanted else ([], True)
         found = comparison.found if comparison else None
         looks = looks_at(path, self.resumed.records if self.resumed else (), records)
         written = write_files(path, Report.of(self.reading, found, looks))
         unsaved = self.folder.flush()
-        problems = [*self._problems, *self.reading.problems, *self.reading.refused]
+        problems = [*self.told, *self.reading.problems, *self.reading.refused]
         problems += [*written.problems, cluster.lost_nodes(records)]
         if written.summaries or written.sweeps:
             changes = comparison.markdown() if comparison else ""
@@ -320,8 +320,9 @@ class Run:
         lost = [write_outcome(path, RunOutcome(passed, found, looks))]
         if badge := options.value(self.config, "sim_badge"):
             lost.append(write_badge(Path(badge), records, passed))
-        self.unwritten = not written.complete or bool(unsaved) or any(lost)
-        problems += [*lost, *recorded]
+        whole = written.complete and made[1] and not unsaved
+        self.unwritten = not whole or any([*lost, *self.told.values()])
+        problems += [*lost, *made[0]]
         if written.complete and not unsaved:
             self.page = path / PAGE_NAME
         else:

@@ -203,6 +203,7 @@ class SimSession:
             return report
         if report.when == "call" and (lines := self.run.of_test(item.nodeid)):
             report.simbench = lines
+        report.simbench_told = dict(self.run.told)
         if report.failed and "sim_case" in fixtures_of(item):
             from pytest_simbench.plugin.marks import describe_failure
 
@@ -212,6 +213,8 @@ class SimSession:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Keep what came with a report until all tests have ended."""
         self._received += getattr(report, "simbench", ())
+        if told := getattr(report, "simbench_told", None):
+            self.run.told |= told
         failed = getattr(report, "simbench_failed", None)
         if failed and not self.in_worker:
             self._failed.append(failed)

@@ -5,6 +5,7 @@ The shapes are the collision shapes, the same that every engine is given.
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from pytest_simbench.description.mesh_check import read_stl
 from pytest_simbench.description.urdf import MovingJoint, PreparedRobot
 from pytest_simbench.scene import FloatArray, Pose, Robot, Vector3
-from pytest_simbench.scene.checks import Wire
+from pytest_simbench.scene.checks import Wire, check_pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,10 +122,12 @@ class Figure(Wire):
         """
         known = {self.root}
         for hinge in self.hinges:
+            check_pose(hinge.origin, f"the joint {hinge.name!r}")
             if hinge.parent not in known or hinge.child in known:
                 raise ValueError(f"the link {hinge.child!r} hangs on none before it")
             known.add(hinge.child)
         for part in self.parts:
+            check_pose(part.pose, f"a shape of {part.link!r}")
             if part.link not in known or (part.mesh is None) == (part.size is None):
                 raise ValueError(f"a shape of {part.link!r} is none")
             if part.mesh is not None and not 0 <= part.mesh < len(self.meshes):
@@ -154,8 +157,9 @@ def composed(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _unit(axis: Sequence[float]) -> Vector3:
-    x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    return (float(x), float(y), float(z))
+    length = math.hypot(*axis)
+    x, y, z = axis
+    return (x / length, y / length, z / length)
 
 
 def _without_meshes(urdf: str) -> str:

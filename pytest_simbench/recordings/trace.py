@@ -25,11 +25,15 @@ import numpy as np
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.ground.files import FileError, read_arrays, read_json
 from pytest_simbench.recordings.figure import Figure, Mesh
+from pytest_simbench.records.checked import convert, plain
 from pytest_simbench.records.paths import whole
 from pytest_simbench.scene import Body, FloatArray, Scene
 
 LARGEST = 512 * 2**20
 """Of a trace when it is read [bytes]."""
+
+LATEST = 2**31 - 1
+"""Of simulated time [s]; the stamps of ROS hold no more."""
 
 FOLDER = "traces"
 """In the run folder."""
@@ -143,7 +147,7 @@ class Trace:
             return cls._checked(arrays, about)
         except FileError as error:
             raise TraceError(f"{error}") from None
-        except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
             told = f"it lacks {error}" if isinstance(error, KeyError) else error
             raise TraceError(f"{path} is no trace of a repetition: {told}") from None
 
@@ -159,7 +163,7 @@ class Trace:
                 and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices)
             ):
                 raise ValueError("a face of a mesh has no vertices")
-        figure = about["figure"]
+        figure = plain(about["figure"])
         found = cls(
             _like(arrays["time"], (None,), "time"),
             np.ascontiguousarray(arrays["joints"], dtype=float),
@@ -167,7 +171,7 @@ class Trace:
             [str(name) for name in arrays["joint_names"]],
             [str(name) for name in arrays["body_names"]],
             [Body.from_wire(box) for box in about["boxes"]],
-            None if figure is None else replace(Figure.from_wire(figure), meshes=meshes).checked(),
+            None if figure is None else replace(convert(figure, Figure), meshes=meshes).checked(),
             [(float(time), str(name)) for time, name in about["phases"]],
         )
         rows = len(found.time)
@@ -175,6 +179,9 @@ class Trace:
         _like(found.bodies, (rows, len(found.body_names), 13), "bodies")
         if not rows or not (np.diff(found.time) > 0).all():
             raise ValueError("its time does not go on")
+        times = [found.time[-1], *(abs(time) for time, _ in found.phases)]
+        if found.time[0] < 0 or not all(time <= LATEST for time in times):
+            raise ValueError(f"its time is not from 0 to {LATEST} s")
         if [box.name for box in found.free] != list(found.body_names):
             raise ValueError("its bodies are not those of its scene")
         moving = [hinge.name for hinge in found.figure.hinges] if found.figure else []

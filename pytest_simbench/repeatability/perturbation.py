@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from pytest_simbench.scene import Pose, Scene, SceneError
+from pytest_simbench.scene.checks import check_count
 
 if TYPE_CHECKING:
     from hypothesis.strategies import SearchStrategy
@@ -150,10 +151,12 @@ def perturbations(
         at_most: how many at once, each of another quantity or cube.
 
     Raises:
-        ValueError: an unknown quantity, a bound below its step, or a scene that has none of them.
+        ValueError: an unknown quantity, a bound below its step, a scene that has none of them, or
+            no number of them.
     """
     from hypothesis import strategies as st
 
+    check_count(at_most, "the number of perturbations at once")
     limits = {q.name: q.bound for q in QUANTITIES.values()} if bounds is None else bounds
     for name in (name for name in limits if name not in QUANTITIES):
         raise ValueError(f"no quantity is named {name!r}; choose from {', '.join(QUANTITIES)}")

@@ -17,6 +17,7 @@ import numpy as np
 from pytest_simbench.client.errors import WorkerError
 from pytest_simbench.client.tape import Tape
 from pytest_simbench.experiment.example import replay_command, write_example
+from pytest_simbench.ground.names import digest
 from pytest_simbench.repeatability.episode import Episode, Episodes, changed
 from pytest_simbench.repeatability.perturbation import (
     QUANTITIES,
@@ -25,6 +26,7 @@ from pytest_simbench.repeatability.perturbation import (
     perturbations,
 )
 from pytest_simbench.repeatability.perturbation import perturbed as perturbed_scene
+from pytest_simbench.scene.checks import check_count
 from pytest_simbench.tasks.base import Outcome, Task
 
 if TYPE_CHECKING:
@@ -60,7 +62,7 @@ class Trial:
             displacement at the start does not count.
         effect: what the perturbation does, in words, "" when the outcome is the same.
         kept: of each count, how much is left: 1 when it is the same or better.
-        tape: of a run that had an end, and another outcome.
+        tape: of a run that had another outcome, or crashed.
     """
 
     divergence: float
@@ -78,9 +80,13 @@ class Attack:
     Args:
         examples: how many runs it may take, the unperturbed one not counted; more may be allowed
             later.
+
+    Raises:
+        ValueError: that is no number of runs.
     """
 
     def __init__(self, episodes: Episodes, examples: int) -> None:
+        check_count(examples, "the number of examples")
         self.episodes = episodes
         self.examples = examples
         self.base: Episode = episodes.run()
@@ -99,7 +105,8 @@ class Attack:
         try:
             episode = self.episodes.run(perturbed)
         except WorkerError as error:
-            return Trial(1.0, f"ends in {type(error).__name__}", kept=0.0)
+            tape = self.episodes.handle.tape
+            return Trial(1.0, f"ends in {type(error).__name__}", kept=0.0, tape=tape)
         found = changed(self.base.counts, episode.counts)
         task = self.episodes.task
         return Trial(
@@ -237,13 +244,13 @@ def search(
 
     Raises:
         WorkerError: in the unperturbed run.
-        ValueError: bounds that make no sense.
+        ValueError: bounds or numbers that make no sense.
     """
     scene = episodes.scene()
-    perturbations(scene, bounds)  # complain of bad bounds before anything runs
+    perturbations(scene, bounds, at_most=at_once)  # complain of bad ones before anything runs
     attack = Attack(episodes, examples)
     failing: list[Perturbations] = []
-    for several in (1,) if at_once == 1 else (1, at_once):
+    for several in (1,) if 1 in (at_once, examples) else (1, at_once):
         attack.examples = examples if several == at_once else -(-examples // ALONE)
         strategy = perturbations(scene, bounds, at_most=several)
         failing = _failing(attack, strategy, shrinks, random_seed)
@@ -304,12 +311,10 @@ def _failing(
 
 def _kept_example(attack: Attack, smallest: Perturbations) -> str:
     """The line that replays the smallest perturbation, from its file in the run folder."""
-    episodes = attack.episodes
-    tape = attack.trials[smallest].tape
-    if not tape:  # it crashed: its episode wrote its own file
-        return ""
+    episodes, tape = attack.episodes, attack.trials[smallest].tape
     case, versions = episodes.handle.case, episodes.handle.constructed.versions
-    name = f"smallest-{episodes.task.name}-{case.simulator}-{case.mode}"
+    which = digest(smallest, episodes.task.parameters())  # a test may search several times
+    name = f"smallest-{episodes.task.name}-{case.simulator}-{case.mode}-{which}"
     scene = perturbed_scene(episodes.scene(), smallest)
     try:
         return replay_command(write_example(case, name, scene, tape, versions), case, scene)

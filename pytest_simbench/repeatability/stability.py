@@ -20,6 +20,7 @@ from pytest_simbench.repeatability.perturbation import (
     perturbations,
 )
 from pytest_simbench.repeatability.search import Attack, Perturbations, bounds_in_words
+from pytest_simbench.scene.checks import check_choice
 from pytest_simbench.tasks import Moment
 
 SENSITIVITY_TIMES = (0.1, 1.0, 5.0, 20.0)
@@ -105,16 +106,24 @@ def stability(
         random_seed: of Hypothesis.
 
     Raises:
+        AssertionError: the unperturbed run scored 0, of which nothing can be lost.
         WorkerError: in the unperturbed run; a perturbed run that crashes keeps nothing.
+        ValueError: bounds or numbers that make no sense.
     """
     import hypothesis
     from hypothesis import Phase, given, settings
 
-    attack = Attack(episodes, examples)
+    strategy = perturbations(episodes.scene(), bounds, at_most=at_most)
+    attack, simulator = Attack(episodes, examples), episodes.handle.case.simulator
+    found = [attack.base.counts[m.name] for m in episodes.task.metrics if m.crashed == 0.0]
+    if found and not any(found):
+        raise AssertionError(
+            f"{simulator}: the run without perturbations scored 0: none can be kept"
+        )
 
     @hypothesis.seed(random_seed)
     @settings(max_examples=examples, deadline=None, database=None, phases=(Phase.generate,))
-    @given(perturbations(episodes.scene(), bounds, at_most=at_most))
+    @given(strategy)
     def drawn(perturbed: Perturbations) -> None:
         attack.trial(perturbed)
 
@@ -123,7 +132,7 @@ def stability(
     worst = min(trials, key=lambda perturbed: trials[perturbed].kept)
     lost = trials[worst].kept < 1
     return Stability(
-        episodes.handle.case.simulator,
+        simulator,
         tuple(trial.kept for trial in trials.values()),
         sum(not trial.effect for trial in trials.values()),
         bounds_in_words(episodes, bounds),
@@ -206,9 +215,11 @@ def sensitivity(
 
     Raises:
         WorkerError: whatever happened to the worker.
-        ValueError: a perturbation that is no displacement.
+        ValueError: a perturbation that is no displacement, or of no body.
     """
-    if QUANTITIES[perturbation.quantity].unit != "mm":
+    names = [body.name for body in episodes.scene().bodies]
+    check_choice(perturbation.body, "the body that is displaced", names)
+    if QUANTITIES[perturbation.quantity].unit != "mm" or not perturbation.steps:
         raise ValueError(f"sensitivity is told per millimetre, not for {perturbation}")
     base = episodes.run()
     moved = episodes.run([perturbation], play=base.tape)

@@ -197,16 +197,17 @@ def test_environments_come_and_go(
     assert "choose from none is there" in said(capsys, "uninstall", name)[2]
 
 
+@pytest.mark.parametrize("command", ["environments", "cluster"])
 def test_an_interruption_is_one_sentence(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
-    def interrupted() -> int:
+    def interrupted(*words: str) -> int:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(environments, "list_environments", interrupted)
-    assert said(capsys, "environments") == (
-        130, "", "simbench environments: interrupted; nothing that it read was changed\n"
-    )  # fmt: skip
+    monkeypatch.setattr("pytest_simbench.cluster.__main__.main", interrupted)
+    told = f"simbench {command}: interrupted; nothing that it read was changed\n"
+    assert said(capsys, command) == (130, "", told)
 
 
 def test_a_reader_that_ends_early_is_no_fault(tmp_path: Path) -> None:

@@ -244,7 +244,7 @@ def test_with_tls_only_who_has_a_certificate_is_served(
             assert message in refused.stderr.str()
         node = [sys.executable, "-m", "pytest_simbench.cluster", "node", machines.address]
         told = subprocess.run(node, capture_output=True, text=True, timeout=60.0)
-        assert (told.returncode, "certificates for the worker" in told.stderr) == (1, True)
+        assert (told.returncode, "certificates for the worker" in told.stderr) == (2, True)
 
 
 def answers(port: int) -> list[int]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import socket
-import subprocess
-import sys
 import threading
+import time
 from argparse import Namespace
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.cluster import pool as module
-from pytest_simbench.cluster.__main__ import not_taken
+from pytest_simbench.cluster.__main__ import main, not_taken
 from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node, here, refusal, unmet
 from pytest_simbench.cluster.pool import Pool
 from pytest_simbench.simulator.registry import adapter
@@ -147,13 +147,37 @@ def test_waiting_ends_when_the_run_does() -> None:
     assert pool.reserve(lambda node: True, (), stop) is None
 
 
-def test_a_head_whose_port_is_taken_says_so() -> None:
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("head --port {}", "127.0.0.1:{} ([Errno 98] Address already in use); give another --host"),
+        ("head --port 99999", "--port: give a whole number from 0"),
+        ("head --lost-after nan", "--lost-after: give 1 to"),
+        ("node tcp://nosuch.invalid:1", "no node for a head at tcp://nosuch.invalid:1: "),
+        ("node tcp://head:1 --slots 0", "--slots: give a whole number from 1"),
+    ],
+)
+def test_what_cannot_begin_says_so(
+    words: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = str(taken.getsockname()[1])
-        command = [sys.executable, "-m", "pytest_simbench.cluster", "head", "--port", port]
-        ended = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert ended.returncode == 1
-    assert "already in use" in ended.stderr
+        port = taken.getsockname()[1]
+        assert main(words.format(port).split()) == 2
+    assert told.format(port) in capsys.readouterr().err
+
+
+def test_a_node_that_looks_for_its_head_ends_when_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask looks for half a minute."""
+
+    def soon() -> asyncio.Event:
+        told = asyncio.Event()
+        asyncio.get_running_loop().call_later(0.5, told.set)
+        return told
+
+    monkeypatch.setattr("pytest_simbench.cluster.__main__._told", soon)
+    began = time.monotonic()
+    assert main(["node", "tcp://127.0.0.1:1", "--sim", "mujoco"]) == 0
+    assert time.monotonic() - began < 20
 
 
 def test_a_node_whose_name_is_taken_is_told_to_take_another() -> None:

@@ -109,7 +109,7 @@ def test_a_premise_of_stored_starts_that_are_all_alike(
     rows = [[0.1 * k, 0.0, z, 1.0, 0.0, 0.0, 0.0] for k in range(5) for z in (0.1, 0.255)]
     np.savez(pytester.path / "starts.npz", lower=rows[::2], upper=rows[1::2])
     (pytester.mkdir("run") / "carried.md").mkdir()
-    found = run_pytest(pytester, "--sim mujoco --sim-output=run", passed=1)
+    found = run_pytest(pytester, "--sim mujoco --sim-output=run -n1", ret=1, passed=1)
     assert "carried.md could not be written (Is a directory)" in found.stdout.str()
     assert "5 starts, and 1 different" in found.stdout.str()
     ends = [r["details"]["places"]["upper"] for r in records(pytester.path / "run")]

@@ -63,14 +63,22 @@ def test_a_kept_run_is_recorded_later(pytester: pytest.Pytester) -> None:
     written = (first / "metadata.yaml").stat().st_mtime_ns
     (sorted((pytester.path / "o" / "traces").iterdir())[1]).write_text("no trace")
     result = simbench(pytester, "report", "o", "--record=mcap")
+    assert result.ret == 1
     result.stdout.fnmatch_lines(["no recording: *holds no arrays*", "1 recording: o/recordings"])
     assert (first / "metadata.yaml").stat().st_mtime_ns == written
 
 
 def test_a_run_without_traces_says_so(tmp_path: Path) -> None:
-    assert recordings(tmp_path, tmp_path, [record()]) == [
-        "no recordings: the run has no traces; see --sim-trace"
-    ]
+    told = ["no recordings: the run has no traces; see --sim-trace"]
+    assert recordings(tmp_path, tmp_path, [record()]) == (told, True)
+
+
+def test_a_recording_that_cannot_be_written_fails_the_run(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(FALLING)
+    (pytester.mkdir("o") / "recordings").touch()
+    result = run_pytest(pytester, f"{TWICE} --sim=mujoco --sim-record=mcap", ret=1, passed=1)
+    result.stdout.fnmatch_lines(["no recording in *o/recordings: File exists"])
+    assert "no traces" not in result.stdout.str()
 
 
 @pytest.mark.usefixtures("drawn")

@@ -69,6 +69,8 @@ def about(path: Path, **changes: Any) -> np.ndarray:
     [
         ({"about": None}, "of an older version"),
         ({"time": np.zeros(12)}, "its time does not go on"),
+        ({"time": np.arange(12) * 1e10}, "its time is not from 0 to 2147483647 s"),
+        ({"time": np.arange(12) - 1.0}, "its time is not from 0 to"),
         ({"time": np.full(12, np.nan)}, "its time are not finite numbers"),
         ({"joints": np.zeros((12, 2, 3))}, "its joints are not finite numbers in the shape"),
         ({"bodies": np.full((12, 2, 13), np.inf)}, "its bodies are not finite numbers"),
@@ -86,12 +88,29 @@ def test_what_is_no_trace_is_refused(changes: Any, message: str, tmp_path: Path)
         Trace.read(tmp_path / "x.npz")
 
 
-def test_links_that_hang_on_each_other_are_refused(tmp_path: Path) -> None:
-    figure = trace().figure
-    wire = figure.to_wire()
-    wire["hinges"][0]["parent"] = wire["hinges"][0]["child"]
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("parent", "panda_link1", "hangs on none before it"),
+        ("axis", [0.0, 0.0, 0.0], "division by zero"),
+        ("axis", ["x", "y", "z"], "'hinges.0..axis.0.': expected 'float', got 'str'"),
+        ("origin", 7, "origin': expected 'dict', got 'int'"),
+        ("origin", {"quaternion": [2, 0, 0, 0]}, "the quaternion of the joint 'panda_joint1' has"),
+    ],
+)
+def test_a_robot_that_cannot_be_is_refused(
+    key: str, value: Any, message: str, tmp_path: Path
+) -> None:
+    wire = trace().figure.to_wire()
+    wire["hinges"][0][key] = value
     spoilt(tmp_path / "x.npz", about=about(tmp_path / "y.npz", figure=wire))
-    with pytest.raises(TraceError, match="hangs on none before it"):
+    with pytest.raises(TraceError, match=message):
+        Trace.read(tmp_path / "x.npz")
+
+
+def test_a_phase_at_no_time_is_refused(tmp_path: Path) -> None:
+    spoilt(tmp_path / "x.npz", about=about(tmp_path / "y.npz", phases=[[-1e300, "pick"]]))
+    with pytest.raises(TraceError, match="its time is not from 0 to"):
         Trace.read(tmp_path / "x.npz")
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from pytest_simbench.client.answers import Constructed
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.tape import Operation, Tape
 from pytest_simbench.records.metrics import Metric
@@ -66,6 +67,7 @@ class Toppling:
     name = "scripted"
     metrics = METRICS
     moments = ()
+    parameters = staticmethod(dict)
 
     def change(self, before: Outcome, after: Outcome) -> str:
         known = "toppled" in before.details
@@ -85,7 +87,8 @@ class Scripted:
     def __init__(self, run: Callable[[tuple[Perturbation, ...]], Episode]) -> None:
         self._run = run
         self.asked: list[tuple[tuple[Perturbation, ...], Any]] = []
-        self.handle = SimpleNamespace(case=SimpleNamespace(simulator="sim", mode="headless"))
+        case = SimpleNamespace(simulator="sim", mode="headless")
+        self.handle = SimpleNamespace(case=case, tape=(), constructed=Constructed())
         self.task = Toppling()
 
     def scene(self) -> Scene:

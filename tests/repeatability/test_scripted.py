@@ -204,6 +204,7 @@ def test_shrinking_has_its_bound() -> None:
     experiment = Scripted(toppling)
     found = search(experiment, {"x": 2e-3}, examples=40, shrinks=2, at_once=1)
     assert found.runs <= found.examples + 2
+    assert search(Scripted(lambda p: moved(0.0)), {"x": 2e-3}, examples=1).runs == 1
 
 
 @pytest.mark.usefixtures("unkept")
@@ -306,8 +307,8 @@ def test_what_a_claim_of_determinism_means() -> None:
 def test_the_smallest_is_kept_as_an_example(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """With its own scene and commands, and the line that replays it; none where it crashed, or
-    where the folder takes none."""
+    """With its own scene and commands, and the line that replays it, also of a crash; none where
+    the folder takes none. Another search, of the same test too, has another file."""
     kept: list[Any] = []
     experiment = Scripted(toppling)
     case = experiment.handle.case
@@ -318,7 +319,6 @@ def test_the_smallest_is_kept_as_an_example(
         return tmp_path / "example.json"
 
     def command(path: Path, of: Any, scene: Any) -> str:
-        assert of is case
         return f"replay {path.name} of {scene.body('a').pose.position[0]:.4f}"
 
     monkeypatch.setattr(search_module, "write_example", write)
@@ -327,22 +327,26 @@ def test_the_smallest_is_kept_as_an_example(
     x = shift(found.smallest)
     assert found.replay == f"replay example.json of {x:.4f}"
     ((of, name, scene, tape, versions),) = kept
-    assert (of, name) == (case, "smallest-scripted-sim-headless")
+    assert (of, name[:31]) == (case, "smallest-scripted-sim-headless-")
     assert scene.body("a").pose.position[0] == pytest.approx(x)
     assert (tape, versions) == (moved(0.0).tape, {"sim": "1"})
     assert to_wire(found)["first"] == described(found.first or ())
     found.assert_not_below("x", found.amount("x"))
+
+    def crashing(perturbed: Perturbed) -> Episode:
+        crashes.handle.tape = [operation("wait", "fall", perturbed[0].amount)] if perturbed else []
+        if abs(shift(perturbed)) > 5.5e-4:
+            raise dead(perturbed)
+        return moved(0.0)
+
+    crashes = Scripted(crashing)
+    crash = search(crashes, {"x": 2e-3}, examples=40, at_once=1)
+    assert (crash.effect, crash.replay[:22]) == ("ends in WorkerExited", "replay example.json of")
+    assert kept[1][1] not in (name, "smallest-scripted-sim-headless")
+    assert [o.duration for o in kept[1][3]] == [shift(crash.smallest)]
 
     def full(*arguments: Any) -> Path:
         raise OSError("no space")
 
     monkeypatch.setattr(search_module, "write_example", full)
     assert search(experiment, {"x": 2e-3}, examples=40, at_once=1).replay == ""
-
-    def crashing(perturbed: Perturbed) -> Episode:
-        if abs(shift(perturbed)) > 4.5e-4:
-            raise dead(perturbed)
-        return moved(0.0)
-
-    crash = search(Scripted(crashing), {"x": 2e-3}, examples=40, at_once=1)
-    assert (crash.effect, crash.replay) == ("ends in WorkerExited", "")

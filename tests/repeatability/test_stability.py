@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,10 +15,11 @@ import pytest
 from pytest_simbench.measure.results import InconclusiveWarning
 from pytest_simbench.repeatability.episode import Episode
 from pytest_simbench.repeatability.perturbation import Perturbation
+from pytest_simbench.repeatability.search import search
 from pytest_simbench.repeatability.stability import Sensitivity, Stability, sensitivity, stability
 from pytest_simbench.tasks.base import Moment
 from tests.repeatability.scripted import Scripted, episode, motion, operation
-from tests.repeatability.test_scripted import ALL, Perturbed, shift, toppling
+from tests.repeatability.test_scripted import ALL, Perturbed, moved, shift, toppling
 
 GROWING = [
     # at 0.1 s after the first motion began, at 0.2 s, the cube is 1, 2, ... displacements away
@@ -110,11 +113,31 @@ def test_a_peak_between_the_times_that_are_told_is_judged() -> None:
         found.assert_below(10.0, until=3.0)
 
 
-def test_no_growth_is_told_of_what_is_no_displacement() -> None:
+@pytest.mark.parametrize(
+    ("ask", "sentence"),
+    [
+        (
+            lambda e: sensitivity(e, Perturbation("yaw", 10, "a")),
+            "per millimetre, not for 1 deg of",
+        ),
+        (lambda e: sensitivity(e, Perturbation("x", 0, "a")), "per millimetre, not for 0 mm in x"),
+        (lambda e: sensitivity(e, Perturbation("x", 1, "c")), "is 'c'; choose from a, b$"),
+        (lambda e: stability(e, {"x": 1e-3}, examples=0), "^the number of examples is 0; it must"),
+        (lambda e: stability(e, {"z": 1e-3}), "^no quantity is named 'z'; choose from x, y, yaw"),
+        (lambda e: search(e, {"x": 1e-3}, at_once=0), "^the number of perturbations at once is 0"),
+    ],
+)
+def test_what_cannot_be_asked_is_a_sentence(ask: Callable[[Any], Any], sentence: str) -> None:
     experiment = Scripted(growing)
-    with pytest.raises(ValueError, match="^sensitivity is told per millimetre, not for 1 deg of"):
-        sensitivity(experiment, Perturbation("yaw", 10, "a"))
+    with pytest.raises(ValueError, match=sentence):
+        ask(experiment)
     assert not experiment.asked
+
+
+def test_what_scored_nothing_can_keep_nothing() -> None:
+    """0 of 4 stood, with and without perturbations: 100 % was said to be kept of it."""
+    with pytest.raises(AssertionError, match="^sim: the run without perturbations scored 0"):
+        stability(Scripted(lambda p: moved(shift(p), {**ALL, "standing": 0.0})), {"x": 1e-3})
 
 
 def test_stability_of_a_known_world() -> None:
