@@ -74,6 +74,20 @@ def test_pages_are_made_beside_the_data(tmp_path: Path, monkeypatch: pytest.Monk
     assert (tmp_path / "laws.md").read_text("utf-8") == "# Laws\n"
 
 
+def test_laws_over_time_steps_are_as_old_as_the_laws() -> None:
+    """Other commands measured them; what a law asks had changed since then."""
+    kept, swept = (
+        {
+            (line["simulator"], line["law"], line["timestep"]): float(line["ratio"] or "inf")
+            for line in of.lines(profile="tuned")
+        }
+        for of in (make_truth.TRUTH, make_truth.SWEEP)
+    )
+    both = kept.keys() & swept.keys()
+    assert len(both) > 500
+    assert [swept[one] for one in both] == pytest.approx([kept[one] for one in both], abs=1e-4)
+
+
 def test_the_rows_of_kept_tables_are_as_wide_as_their_headings() -> None:
     for name, text in made.kept_pages().items():
         assert text.startswith("# "), name
