@@ -55,9 +55,10 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
             raise BadInput(f"{search.describe(place)}, so nothing tells worse")
     found, _ = compared(metric, good, bad)
     if not (found.significant() and metric.differs(found.first, found.second)):
+        tiny = "by less than means anything" if found.significant() else f"p = {found.p_value:.2g}"
         print(
             f"{search.describe(0)}, {search.describe(last)}: these repetitions do not show that it "
-            f"is worse (p = {found.p_value:.2g}), so there is nothing to find; try more of them, "
+            f"is worse ({tiny}), so there is nothing to find; try more of them, "
             "--reps 40 for instance"
         )
         return 1
