@@ -23,8 +23,12 @@ TOLERANCE = {"pushing": 0.01, "picking": 0.006}
 """Of the place [m]. What a shipped policy sees is off by 5 mm along x and y (standard deviation);
 fingers that close put a cube right along one of them."""
 
-PERIODS = (0, 1, 2, 4)
-"""Of a policy, by which its commands come late."""
+DELAYS = {"late0": {}} | {
+    f"{name}{periods}": {delay: periods}
+    for name, delay in (("late", "command_latency"), ("old", "observation_delay"))
+    for periods in (1, 2, 4)
+}
+"""Periods of a policy, by which its commands come late, or what it is shown is old."""
 
 
 def pushing(policy, **more):
@@ -49,6 +53,6 @@ def test_picking(repeat, policy):
 
 
 @pytest.mark.policies("pushing", "scripted")
-@pytest.mark.parametrize("late", PERIODS, ids=lambda periods: f"late{periods}")
-def test_pushing_with_delay(repeat, policy, late):
-    repeat(pushing(policy, command_latency=late / policy.rate))
+@pytest.mark.parametrize("delay", DELAYS)
+def test_pushing_with_delay(repeat, policy, delay):
+    repeat(pushing(policy, **{name: k / policy.rate for name, k in DELAYS[delay].items()}))
