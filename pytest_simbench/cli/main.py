@@ -24,11 +24,11 @@ INTERRUPTED = 130
 
 class Argument(NamedTuple):
     """An argument of a command, as argparse has it; its name is that of the parameter that takes
-    the values."""
+    the values. None: argparse takes nothing of this kind."""
 
     name: str
-    type: Callable[[str], Any]
-    metavar: str
+    type: Callable[[str], Any] | None
+    metavar: str | None
     help: str
     nargs: str | None = None
     action: str | None = None
@@ -38,8 +38,8 @@ class Subcommand(NamedTuple):
     """A command.
 
     Attributes:
-        function: `module:name` of what does the work. It takes the arguments by their names; one
-            called `main` takes the words and reads them itself.
+        name: with a group's before it, where there is one.
+        function: `module:name` of what does the work. It takes the arguments by their names.
         more: a second sentence for its own help.
         verbose: what -v adds; empty for a command without it.
     """
@@ -50,6 +50,10 @@ class Subcommand(NamedTuple):
     more: str = ""
     arguments: tuple[Argument, ...] = ()
     verbose: str = ""
+
+
+def _flag(name: str, help: str) -> Argument:
+    return Argument(name, None, None, help, None, "store_true")
 
 
 _OF_RUNS = (
@@ -154,12 +158,47 @@ COMMANDS = (
                 Argument("--budget", read.duration, "TIME", "default: 30min"),
                 Argument("--output", read.file, "DIR", "folder of the run"),
             )),
-    Subcommand("stats", "measure.__main__:main", "print what the suites' claims let pass"),
-    Subcommand("replay", "repeatability.__main__:main", "replay an episode that a failing test "
-            "left in its run folder"),
-    Subcommand("cluster", "cluster.__main__:main", "start the head of a cluster, or a node of it"),
-    Subcommand("swing", "motion.swing:main", "find a swing for the throw of a robot"),
+    Subcommand("stats", "measure.suites:stats", "print what the suites' claims let pass"),
+    Subcommand("replay", "repeatability.example:replay_file", "replay an episode that a failing "
+            "test left in its run folder", "The file says what to simulate; how to start the "
+            "simulator is this machine's own.", (
+                Argument("path", read.file, "FILE", "examples/NAME.json in the run folder"),
+                _flag("--gui", "in the simulator's own window"),
+                Argument("--python", read.file, "PATH", "interpreter of the simulator's worker"),
+                Argument("--spec", str, "SPEC", "execnet specification of the simulator's worker"),
+                _flag("--trust-robot", "use the description files that FILE names, for a robot "
+                      "that is not known here"),
+            )),
+    Subcommand("cluster head", "cluster.serving:head", "the scheduler, which knows all nodes; one "
+            "of it", "", (
+                Argument("--host", str, "HOST", "address to listen on (default: 127.0.0.1)"),
+                Argument("--port", read.Number(0, 65535, whole=True), "PORT", "default: 8786"),
+                Argument("--lost-after", read.Number(1, read.LONGEST), "SECONDS", "silence after "
+                         "which a node counts as lost (default: 30)"),
+                _flag("--tls", "encrypted, by the certificates of Dask's configuration"),
+                _flag("--pages", "serve Dask's pages, to whoever reaches this machine"),
+            )),
+    Subcommand("cluster node", "cluster.serving:node", "a machine that carries repetitions out",
+            "", (
+                Argument("address", read.address, "ADDRESS", "of the head: tcp://head:8786, or "
+                         "tls://head:8786"),
+                Argument("--host", str, "HOST", "address to listen on (default: the one that faces "
+                         "the head)"),
+                Argument("--name", str, "NAME", "in records (default: the machine's)"),
+                Argument("--slots", read.REPETITIONS, "N", "repetitions at once; with more than "
+                         "one, records are contended (default: 1)"),
+                Argument("--sim", read.simulators, "NAME,...", "simulators to offer (default: all "
+                         "that are ready here)"),
+            )),
+    Subcommand("swing", "motion.swing:print_swing", "find a swing for the throw of a robot", "", (
+                Argument("robot", read.robot, "NAME|FILE", "a name that simbench robots lists, or "
+                         "a TOML file"),
+                Argument("--landing", read.ANY_NUMBER, "X", "times the scene's scale [m] (default: "
+                         "1.367)"),
+            )),
 )  # fmt: skip
+
+GROUPS = {"cluster": "start the head of a cluster, or a node of it"}
 
 
 class Parser(argparse.ArgumentParser):
@@ -177,12 +216,17 @@ def parser() -> Parser:
         description="Compare robot simulators: everything besides the tests, which pytest runs.",
         epilog="simbench COMMAND --help says what a command takes.",
     )
-    commands = top.add_subparsers(metavar="COMMAND", dest="command", parser_class=Parser)
+    places = {"": top.add_subparsers(metavar="COMMAND", parser_class=Parser)}
     for command in COMMANDS:
+        group, _, name = command.name.rpartition(" ")
+        if group not in places:
+            one = places[""].add_parser(group, help=GROUPS[group])
+            places[group] = one.add_subparsers(required=True, metavar="COMMAND")
         about = f"{command.help[0].upper()}{command.help[1:]}. {command.more}".strip()
-        one = commands.add_parser(command.name, help=command.help, description=about)
+        one = places[group].add_parser(name, help=command.help, description=about)
+        one.set_defaults(function=command.function)
         for argument in command.arguments:
-            given = argument._asdict()
+            given = {key: value for key, value in argument._asdict().items() if value is not None}
             one.add_argument(given.pop("name"), **given)
         if command.verbose:
             one.add_argument("-v", "--verbose", action="store_true", help=command.verbose)
@@ -192,17 +236,14 @@ def parser() -> Parser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do what a command line asks for; the exit code: 2 for one that cannot be."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    functions = {command.name: command.function for command in COMMANDS}
     name = words[0] if words else ""
+    top = parser()
+    given = vars(top.parse_args(words))
+    if not given:
+        top.print_help(sys.stderr)
+        return BAD_INPUT
     try:
-        if functions.get(name, "").endswith(":main"):
-            return int(_function(functions[name])(words[1:]) or 0)
-        top = parser()
-        given = vars(top.parse_args(words))
-        if given.pop("command") is None:
-            top.print_help(sys.stderr)
-            return BAD_INPUT
-        status = int(_function(functions[name])(**given))
+        status = int(_function(given.pop("function"))(**given))
         sys.stdout.flush()
         return status
     except _complaints() as error:  # looked at when there is one
@@ -228,9 +269,11 @@ def _complaints() -> tuple[type[Exception], ...]:
     """The errors whose messages are for the user."""
     from pytest_simbench.client.errors import ExecutorError
     from pytest_simbench.data.measured import DataError
+    from pytest_simbench.experiment.example import ExampleError
     from pytest_simbench.ground.errors import SimulatorError
+    from pytest_simbench.motion.errors import RobotError
 
-    return read.BadInput, SimulatorError, ExecutorError, DataError
+    return read.BadInput, SimulatorError, ExecutorError, DataError, ExampleError, RobotError
 
 
 def _complain(command: str, sentence: str, status: int) -> int:

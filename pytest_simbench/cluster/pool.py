@@ -25,6 +25,8 @@ from pytest_simbench.cluster.offers import Node
 if TYPE_CHECKING:
     from distributed import Client, Future
 
+INSTALL = "a cluster needs Dask: pip install 'pytest-simbench[cluster]'"
+
 CONNECT_TIMEOUT = 10.0
 """For the scheduler to answer [s]."""
 
@@ -42,6 +44,16 @@ PATIENCE = 60.0
 """How long a job waits for a node that offers what it needs, when there is none left [s]."""
 
 
+def check_certificates(role: str) -> None:
+    """Complain where Dask's configuration has no certificate for a client, worker or scheduler."""
+    from distributed import Security
+
+    if Security().get_connection_args(role).get("ssl_context") is None:
+        raise ExecutorError(
+            f"tls:// needs certificates for the {role} in Dask's configuration (docs/cluster.md)"
+        )
+
+
 class Pool:
     """A cluster's nodes. Safe to use from several threads.
 
@@ -56,15 +68,10 @@ class Pool:
         try:
             from distributed import Client, Security
         except ImportError:
-            raise ExecutorError(
-                "a cluster needs Dask: pip install 'pytest-simbench[cluster]'"
-            ) from None
-        security, tls = Security(), address.lower().startswith("tls")
-        if tls and security.get_connection_args("client").get("ssl_context") is None:
-            raise ExecutorError(
-                "tls:// needs certificates for the client in Dask's configuration (docs/cluster.md)"
-            )
-        if security.require_encryption and not tls:
+            raise ExecutorError(INSTALL) from None
+        if address.lower().startswith("tls"):
+            check_certificates("client")
+        elif Security().require_encryption:
             raise ExecutorError(
                 "Dask's configuration here asks for encryption; start the head with --tls, and "
                 "write tls://"

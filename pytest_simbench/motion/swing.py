@@ -17,9 +17,7 @@ length is adjusted.
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -244,36 +242,20 @@ def _adjusted(
     return None
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Prints the swing of a robot as its file takes it."""
-    parser = argparse.ArgumentParser(prog="simbench swing")
-    parser.add_argument("robot", help="a name that simbench robots lists, or a TOML file")
-    parser.add_argument(
-        "--landing",
-        type=float,
-        default=LANDING,
-        help="in x, times the scene's scale [m] (%(default)s)",
-    )
-    options = parser.parse_args(arguments)
-    try:
-        robot = find(options.robot)
-        scale = grasping_scale_of(robot)
-        size = scale * THROWN.size[0]
-        held = replace(THROWN, size=(size,) * 3, mass=THROWN.mass * scale**3)
-        start, end = found_swing(
-            grasping(robot, size, scale),
-            held,
-            np.array(STANDARD_GRAVITY),
-            options.landing * scale,
-            scale,
-        )
-    except RobotError as error:
-        parser.exit(2, f"{parser.prog}: {error}\n")
+def print_swing(robot: str, landing: float | None = None) -> int:
+    """Print the swing of a robot as its file takes it.
+
+    Raises:
+        RobotError: there is no such robot, or no swing within its limits.
+    """
+    arm = find(robot)
+    scale = grasping_scale_of(arm)
+    size = scale * THROWN.size[0]
+    held = replace(THROWN, size=(size,) * 3, mass=THROWN.mass * scale**3)
+    at = (LANDING if landing is None else landing) * scale
+    gravity = np.array(STANDARD_GRAVITY)
+    start, end = found_swing(grasping(arm, size, scale), held, gravity, at, scale)
     print("[throw]")
     for name, joints in (("start", start), ("end", end)):
         print(f"{name} = {[round(float(angle), 4) for angle in joints]}")
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -13,7 +13,7 @@ import pytest
 
 import pytest_simbench
 from pytest_simbench.cli import environments
-from pytest_simbench.cli.main import COMMANDS
+from pytest_simbench.cli.main import COMMANDS, GROUPS
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.simulator.registry import adapter, registered
 from tests.cli.command import said
@@ -26,13 +26,14 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = said(capsys, "--help")
     assert status == 0
     shown = " ".join(out.split())
-    assert [c.name for c in COMMANDS if f" {c.name} {c.help}" not in shown] == []
+    told = GROUPS | {c.name: c.help for c in COMMANDS if " " not in c.name}
+    assert [name for name, text in told.items() if f" {name} {text}" not in shown] == []
     assert said(capsys)[::2] == (2, out)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_command_has_help(capsys: pytest.CaptureFixture[str], name: str) -> None:
-    status, out, _ = said(capsys, name, "--help")
+    status, out, _ = said(capsys, *name.split(), "--help")
     assert status == 0
     assert out.startswith(f"usage: simbench {name} [-h]")
 
@@ -68,6 +69,10 @@ def test_help_loads_nothing_large() -> None:
         ("list mujoco --settings ode", "simbench list: give names, or --settings SIM alone"),
         ("list --settings mujoko", "simbench list: unknown simulator 'mujoko'; choose from *"),
         ("list --cluster x", "*--cluster: write it as tcp://HOST:PORT or tls://HOST:PORT; *"),
+        ("cluster head --port 99999", "*--port: give a whole number from 0 to 65535; *"),
+        ("cluster head --lost-after nan", "*--lost-after: give a number from 1 to 1e+06; *"),
+        ("cluster node x", "*ADDRESS: write it as tcp://HOST:PORT or tls://HOST:PORT; *"),
+        ("cluster node tcp://head:1 --slots 0", "*--slots: give a whole number from 1 to *"),
         ("robots nosuch", "simbench robots: *nosuch*panda*"),
         ("install nosuch", "simbench install: unknown simulator 'nosuch'; choose from *"),
         ("install mujoco", "simbench install: mujoco needs no environment of its own: *"),
@@ -119,7 +124,7 @@ def test_what_cannot_be_is_one_sentence(
     monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path / "environments"))
     status, _, told = said(capsys, *words.split())
     assert status == 2
-    assert told.count("\n") == 1 or words.startswith("stats")
+    assert told.count("\n") == 1
     assert fnmatchcase(told.splitlines()[-1], sentence)
 
 
@@ -197,17 +202,18 @@ def test_environments_come_and_go(
     assert "choose from none is there" in said(capsys, "uninstall", name)[2]
 
 
-@pytest.mark.parametrize("command", ["environments", "cluster"])
+@pytest.mark.parametrize("command", ["environments", "cluster head"])
 def test_an_interruption_is_one_sentence(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:
-    def interrupted(*words: str) -> int:
+    def interrupted(**words: object) -> int:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(environments, "list_environments", interrupted)
-    monkeypatch.setattr("pytest_simbench.cluster.__main__.main", interrupted)
-    told = f"simbench {command}: interrupted; nothing that it read was changed\n"
-    assert said(capsys, command) == (130, "", told)
+    monkeypatch.setattr("pytest_simbench.cluster.serving.head", interrupted)
+    name, *_ = words = command.split()
+    told = f"simbench {name}: interrupted; nothing that it read was changed\n"
+    assert said(capsys, *words) == (130, "", told)
 
 
 def test_a_reader_that_ends_early_is_no_fault(tmp_path: Path) -> None:

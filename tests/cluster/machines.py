@@ -113,7 +113,7 @@ class Machines:
         word: str,
         environment: Mapping[str, str] | None = None,
     ) -> None:
-        command = [sys.executable, "-m", "pytest_simbench.cluster", *arguments]
+        command = [sys.executable, "-m", "pytest_simbench", "cluster", *arguments]
         if self.networks:
             command = ["ip", "netns", "exec", f"{self._mark}-{name}", *command]
         log = self.folder / f"{name}.log"

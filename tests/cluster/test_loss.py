@@ -242,7 +242,7 @@ def test_with_tls_only_who_has_a_certificate_is_served(
             refused = pytester.runpytest_subprocess(*arguments[:2], f"--sim-cluster={address}")
             assert refused.ret == pytest.ExitCode.USAGE_ERROR
             assert message in refused.stderr.str()
-        node = [sys.executable, "-m", "pytest_simbench.cluster", "node", machines.address]
+        node = [sys.executable, "-m", "pytest_simbench", "cluster", "node", machines.address]
         told = subprocess.run(node, capture_output=True, text=True, timeout=60.0)
         assert (told.returncode, "certificates for the worker" in told.stderr) == (2, True)
 

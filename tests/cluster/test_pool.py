@@ -6,16 +6,16 @@ import asyncio
 import socket
 import threading
 import time
-from argparse import Namespace
 from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 
+from pytest_simbench.cli.main import main
 from pytest_simbench.cluster import pool as module
-from pytest_simbench.cluster.__main__ import main, not_taken
 from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node, here, refusal, unmet
 from pytest_simbench.cluster.pool import Pool
+from pytest_simbench.cluster.serving import not_taken
 from pytest_simbench.simulator.registry import adapter
 from tests.cluster.machines import release_in
 
@@ -151,10 +151,8 @@ def test_waiting_ends_when_the_run_does() -> None:
     ("words", "told"),
     [
         ("head --port {}", "127.0.0.1:{} ([Errno 98] Address already in use); give another --host"),
-        ("head --port 99999", "--port: give a whole number from 0"),
-        ("head --lost-after nan", "--lost-after: give 1 to"),
-        ("node tcp://nosuch.invalid:1", "no node for a head at tcp://nosuch.invalid:1: "),
-        ("node tcp://head:1 --slots 0", "--slots: give a whole number from 1"),
+        ("head --tls", "tls:// needs certificates for the scheduler in Dask's configuration"),
+        ("node tcp://nosuch.invalid:1", "no node for a head at tcp://nosuch.invalid:1 ("),
     ],
 )
 def test_what_cannot_begin_says_so(
@@ -162,7 +160,7 @@ def test_what_cannot_begin_says_so(
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        assert main(words.format(port).split()) == 2
+        assert main(["cluster", *words.format(port).split()]) == 2
     assert told.format(port) in capsys.readouterr().err
 
 
@@ -174,16 +172,16 @@ def test_a_node_that_looks_for_its_head_ends_when_told(monkeypatch: pytest.Monke
         asyncio.get_running_loop().call_later(0.5, told.set)
         return told
 
-    monkeypatch.setattr("pytest_simbench.cluster.__main__._told", soon)
+    monkeypatch.setattr("pytest_simbench.cluster.serving._told", soon)
     began = time.monotonic()
-    assert main(["node", "tcp://127.0.0.1:1", "--sim", "mujoco"]) == 0
+    assert main(["cluster", "node", "tcp://127.0.0.1:1", "--sim", "mujoco"]) == 0
     assert time.monotonic() - began < 20
 
 
 def test_a_node_whose_name_is_taken_is_told_to_take_another() -> None:
     error = RuntimeError("Nanny failed to start.")
     error.__cause__ = RuntimeError("Worker failed to start.")
-    told = not_taken(Namespace(address="tcp://head:8786", name="vm"), error)
+    told = not_taken("tcp://head:8786", "vm", error)
     assert told.endswith("that the name 'vm' is taken, give another --name")
-    away = not_taken(Namespace(address="tcp://head:8786", name="vm"), OSError("Timed out"))
+    away = not_taken("tcp://head:8786", "vm", OSError("Timed out"))
     assert away == "no head at tcp://head:8786 takes this node (Timed out)"

@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import UnsatisfiedAssumption
 
+from pytest_simbench.cli.main import main
 from pytest_simbench.client.errors import WorkerExited
 from pytest_simbench.client.tape import Operation
 from pytest_simbench.experiment.case import Case
@@ -29,7 +30,6 @@ from pytest_simbench.experiment.example import (
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
-from pytest_simbench.repeatability.__main__ import main
 from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.tasks.base import cube
 from tests.hostile import assert_harmless_terminal
@@ -105,7 +105,7 @@ def test_a_failing_test_keeps_its_worker_and_tells_how_to_replay(
     assert note.endswith(path.name)
     with handle.episode(SCENE) as world:
         assert world.process.pid == pid
-    assert main([str(path)]) == 0
+    assert main(["replay", str(path)]) == 0
     told = capsys.readouterr().out
     assert told.startswith("mujoco headless tuned, t = 0.300 s")
     assert f"a: {end[0]:.4f} {end[1]:.4f} {end[2]:.4f} m" in told
@@ -196,13 +196,13 @@ def test_what_a_file_says_of_starting_is_not_looked_at(
         deterministic=True,
         compile_timeout=900.0,
     )
-    assert main([str(path)]) == 0
+    assert main(["replay", str(path)]) == 0
     assert not victim.exists()
     assert not (tmp_path / "there").exists()
 
 
 def test_another_version_is_said(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(path)]) == 0
+    assert main(["replay", str(path)]) == 0
     note, result, _ = capsys.readouterr().out.splitlines()
     assert note.startswith("note: the file was made with mujoco 3.0.0, this is ")
     assert result == "mujoco headless tuned, t = 0.100 s"
@@ -228,14 +228,14 @@ def test_a_robot_of_unknown_files_needs_a_word(
 ) -> None:
     scene = replace(SCENE, robot=replace(panda(), name="mine"))
     path = write_example(case, "robot", scene, TAPE)
-    assert main([str(path)]) == 2
+    assert main(["replay", str(path)]) == 2
     assert (
         "robot 'mine' is not known here (known: panda, so101, ur10, ur5, xarm7)"
         in capsys.readouterr().err
     )
     assert read_example(path, tmp_path, trust_robot=True).scene == scene
     assert replay_command(path, case, scene).endswith(f"{path.name} --trust-robot")
-    assert main([str(path), "--trust-robot"]) == 0
+    assert main(["replay", str(path), "--trust-robot"]) == 0
 
 
 def test_the_line_says_how_it_was_started_here(case: Case, tmp_path: Path) -> None:
@@ -251,8 +251,8 @@ def test_another_interpreter_is_the_user_s_to_name(
 ) -> None:
     found = read_example(path, tmp_path, python="/usr/bin/python3").case
     assert (found.python, found.spec) == ("/usr/bin/python3", None)
-    assert main([str(path), f"--python={sys.executable}"]) == 0
-    assert main([str(path), "--python=/nowhere/python"]) == 1
+    assert main(["replay", str(path), f"--python={sys.executable}"]) == 0
+    assert main(["replay", str(path), "--python=/nowhere/python"]) == 1
     assert "/nowhere/python" in capsys.readouterr().err
 
 
@@ -297,10 +297,10 @@ BROKEN: list[tuple[tuple[Any, ...], Any, str]] = [
 def test_something_else_in_it_is_a_sentence(
     path: Path, keys: tuple[Any, ...], value: Any, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([str(changed(path, *keys, to=value))]) == 2
+    assert main(["replay", str(changed(path, *keys, to=value))]) == 2
     told = capsys.readouterr().err
     assert said in told
-    assert told.startswith(str(path))
+    assert told.startswith(f"simbench replay: {path}")
     assert told.count("\n") == 1
     assert_harmless_terminal(told)
 
@@ -341,8 +341,10 @@ def test_a_file_that_holds_no_episode(
     path.write_text(text, errors="surrogateescape")
     with pytest.raises(ExampleError, match="holds no episode of pytest-simbench: "):
         read_example(path, tmp_path)
-    assert main([str(path)]) == 2
-    assert capsys.readouterr().err.startswith(f"{path} holds no episode of pytest-simbench: ")
+    assert main(["replay", str(path)]) == 2
+    assert capsys.readouterr().err.startswith(
+        f"simbench replay: {path} holds no episode of pytest-simbench: "
+    )
 
 
 JSON = st.recursive(
@@ -378,7 +380,7 @@ def test_what_is_no_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
         ("pipe", "it is a pipe"),
         ("large", "it is larger than 64 MB"),
     ):
-        assert main([str(tmp_path / name)]) == 2
+        assert main(["replay", str(tmp_path / name)]) == 2
         assert said in capsys.readouterr().err
 
 
@@ -390,8 +392,8 @@ def test_a_worker_that_fails_is_a_sentence(
 
         raise EngineFailed(f"no {EVIL}", Where("mujoco", "headless"))
 
-    monkeypatch.setattr("pytest_simbench.repeatability.__main__._replay", fails)
-    assert main([str(path)]) == 1
+    monkeypatch.setattr("pytest_simbench.repeatability.example._replay", fails)
+    assert main(["replay", str(path)]) == 1
     told = capsys.readouterr().err
     assert told.startswith(r"no \x1b]0;owned")
     assert_harmless_terminal(told)

@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import ttest_ind
 
-from pytest_simbench.measure.__main__ import main
 from pytest_simbench.measure.intervals import Interval, interval, proportion
 from pytest_simbench.measure.power import (
     alike_rate,
@@ -20,6 +19,7 @@ from pytest_simbench.measure.power import (
     repetitions_for_proportion,
     repetitions_to_detect,
 )
+from pytest_simbench.measure.suites import stats
 from pytest_simbench.records.metrics import Metric
 
 COUNT = Metric("picks", "picks")
@@ -145,7 +145,7 @@ def test_repetitions_that_are_all_alike_are_refuted_below_their_rate() -> None:
 def test_the_table_of_the_docs_is_what_is_printed(
     capsys: pytest.CaptureFixture[str], pytestconfig: pytest.Config
 ) -> None:
-    main()
+    stats()
     printed = capsys.readouterr().out
     assert "| crashed at most 15 % | 20 | 0 crashed | 33 % | 51 % |  |" in printed
     page = (pytestconfig.rootpath / "docs" / "gate.md").read_text()

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pytest_simbench.cli.main import main
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import ARMS, find
-from pytest_simbench.motion.swing import LANDING, THROWN, found_swing, main
+from pytest_simbench.motion.swing import LANDING, THROWN, found_swing
 from pytest_simbench.motion.throw import feasible_swing, released, swing_of
 from pytest_simbench.scene import STANDARD_GRAVITY, Pose, Robot, Scene, SceneError
 from tests.motion.small_arm import TOML, small_arm
@@ -51,7 +52,7 @@ def test_the_swing_of_a_built_in_arm(name: str) -> None:
 
 
 def test_the_file_has_what_the_command_finds(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["ur5"]) == 0
+    assert main(["swing", "ur5"]) == 0
     found = capsys.readouterr().out.partition("\n")[2].strip()
     assert found in (ARMS / "ur5.toml").read_text("utf-8")
 
@@ -64,13 +65,10 @@ def test_it_lands_elsewhere_if_asked_to() -> None:
 
 
 def test_too_far_is_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["ur5", "--landing=30"])
-    assert ended.value.code == 2
+    assert main(["swing", "ur5", "--landing=30"]) == 2
     said = "robot 'ur5' cannot throw to x = 30 m: no swing within its limits was found\n"
     assert capsys.readouterr().err == f"simbench swing: {said}"
-    with pytest.raises(SystemExit):
-        main(["ur7"])
+    assert main(["swing", "ur7"]) == 2
     assert "unknown robot 'ur7'; choose from" in capsys.readouterr().err
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from pytest_simbench.repeatability.__main__ import main
+from pytest_simbench.cli.main import main
 from pytest_simbench.repeatability.episode import Episodes
 from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.repeatability.search import Attack, search
@@ -48,7 +48,7 @@ def test_shrinks_to_the_margin_and_tells_how_to_replay(
         r"replay it: simbench replay .*smallest-leaning_towers-mujoco",
     ):
         finding.assert_not_below("x", 0.009)
-    assert main([finding.replay.rpartition(" ")[2]]) == 0
+    assert main(["replay", finding.replay.rpartition(" ")[2]]) == 0
     told = capsys.readouterr().out
     moved = {
         line.split(":")[0].strip(): float(line.split(", ")[1].split()[0])
