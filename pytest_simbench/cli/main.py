@@ -24,12 +24,12 @@ INTERRUPTED = 130
 
 class Argument(NamedTuple):
     """An argument of a command, as argparse has it; its name is that of the parameter that takes
-    the values. None: argparse takes nothing of this kind."""
+    the values."""
 
     name: str
-    type: Callable[[str], Any] | None
-    metavar: str | None
-    help: str
+    type: Callable[[str], Any] | None = None
+    metavar: str | None = None
+    help: str = ""
     nargs: str | None = None
     action: str | None = None
 
@@ -50,10 +50,6 @@ class Subcommand(NamedTuple):
     more: str = ""
     arguments: tuple[Argument, ...] = ()
     verbose: str = ""
-
-
-def _flag(name: str, help: str) -> Argument:
-    return Argument(name, None, None, help, None, "store_true")
 
 
 _OF_RUNS = (
@@ -163,11 +159,11 @@ COMMANDS = (
             "test left in its run folder", "The file says what to simulate; how to start the "
             "simulator is this machine's own.", (
                 Argument("path", read.file, "FILE", "examples/NAME.json in the run folder"),
-                _flag("--gui", "in the simulator's own window"),
+                Argument("--gui", help="in the simulator's own window", action="store_true"),
                 Argument("--python", read.file, "PATH", "interpreter of the simulator's worker"),
                 Argument("--spec", str, "SPEC", "execnet specification of the simulator's worker"),
-                _flag("--trust-robot", "use the description files that FILE names, for a robot "
-                      "that is not known here"),
+                Argument("--trust-robot", help="use the description files that FILE names, for a "
+                         "robot that is not known here", action="store_true"),
             )),
     Subcommand("cluster head", "cluster.serving:head", "the scheduler, which knows all nodes; one "
             "of it", "", (
@@ -175,8 +171,10 @@ COMMANDS = (
                 Argument("--port", read.Number(0, 65535, whole=True), "PORT", "default: 8786"),
                 Argument("--lost-after", read.Number(1, read.LONGEST), "SECONDS", "silence after "
                          "which a node counts as lost (default: 30)"),
-                _flag("--tls", "encrypted, by the certificates of Dask's configuration"),
-                _flag("--pages", "serve Dask's pages, to whoever reaches this machine"),
+                Argument("--tls", help="encrypted, by the certificates of Dask's configuration",
+                         action="store_true"),
+                Argument("--pages", help="serve Dask's pages, to whoever reaches this machine",
+                         action="store_true"),
             )),
     Subcommand("cluster node", "cluster.serving:node", "a machine that carries repetitions out",
             "", (

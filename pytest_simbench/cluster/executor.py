@@ -157,7 +157,7 @@ class RemoteRepetition:
             if self._stop.is_set():
                 if reserved is not None:
                     self.pool.release(reserved[0])
-                raise self._interrupted()
+                raise Interrupted("the run was interrupted", self.where)
             if reserved is None:
                 raise NodeLost(self._why("no other node offers it"), self.where)
             key, self._node = reserved
@@ -185,9 +185,6 @@ class RemoteRepetition:
         lost = f"it was lost on {', then on '.join(self._lost)}; " if self._lost else ""
         return f"{lost}{end}"
 
-    def _interrupted(self) -> BaseException:
-        return Interrupted("the run was interrupted", self.where)
-
     def _on(self, node: Node, key: str, job: Packed) -> Mapping[str, Any]:
         """Have a node carry it out.
 
@@ -201,7 +198,7 @@ class RemoteRepetition:
             shown: Mapping[str, Any] = {}
             while not wait([coming], LOOK_PERIOD).done:
                 if self._stop.is_set():
-                    raise self._interrupted()
+                    raise Interrupted("the run was interrupted", self.where)
                 if not self.pool.lives(node):
                     raise _Lost(GONE)
                 shown = self._show(key, shown)

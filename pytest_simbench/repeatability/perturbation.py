@@ -151,8 +151,7 @@ def perturbations(
         at_most: how many at once, each of another quantity or cube.
 
     Raises:
-        ValueError: an unknown quantity, a bound below its step, a scene that has none of them, or
-            no number of them.
+        ValueError: an unknown quantity, a bound below its step, none of them in the scene, or 0.
     """
     from hypothesis import strategies as st
 

@@ -80,9 +80,6 @@ class Attack:
     Args:
         examples: how many runs it may take, the unperturbed one not counted; more may be allowed
             later.
-
-    Raises:
-        ValueError: that is no number of runs.
     """
 
     def __init__(self, episodes: Episodes, examples: int) -> None:

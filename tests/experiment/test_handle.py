@@ -30,7 +30,7 @@ from pytest_simbench.experiment.example import (
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
-from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.scene import Pose, Robot, Scene
 from pytest_simbench.tasks.base import cube
 from tests.hostile import assert_harmless_terminal
 
@@ -208,19 +208,13 @@ def test_another_version_is_said(path: Path, capsys: pytest.CaptureFixture[str])
     assert result == "mujoco headless tuned, t = 0.100 s"
 
 
-def test_the_robot_is_this_machine_s(case: Case, tmp_path: Path) -> None:
-    path = write_example(case, "robot", replace(SCENE, robot=panda(squeeze=10.0)), TAPE)
+@pytest.mark.parametrize("robot", [panda(squeeze=10.0), find("ur5")], ids=lambda robot: robot.name)
+def test_a_built_in_robot_is_this_machine_s(case: Case, tmp_path: Path, robot: Robot) -> None:
+    path = write_example(case, "robot", replace(SCENE, robot=robot), TAPE)
     assert "/" not in json.dumps(json.loads(path.read_text())["scene"])  # no path of ours
     for key, value in (("urdf", "/etc/passwd"), ("packages", {"x": "/"}), ("srdf", "/dev/zero")):
         changed(path, "scene", "robot", key, to=value)
-    assert read_example(path, tmp_path).scene.robot == panda(squeeze=10.0)
-
-
-def test_another_robot_that_is_built_in(case: Case, tmp_path: Path) -> None:
-    scene = replace(SCENE, robot=find("ur5"))
-    path = write_example(case, "robot", scene, TAPE)
-    assert "/" not in json.dumps(json.loads(path.read_text())["scene"])
-    assert read_example(path, tmp_path).scene == scene
+    assert read_example(path, tmp_path).scene.robot == robot
 
 
 def test_a_robot_of_unknown_files_needs_a_word(

@@ -52,10 +52,15 @@ def test_each_repetition_gets_a_bag(pytester: pytest.Pytester, more: list[str]) 
         assert "test_falling[mujoco-headless]" in told
 
 
-def test_a_kept_run_is_recorded_later(pytester: pytest.Pytester) -> None:
+def test_what_could_not_be_recorded_fails_the_run_and_is_recorded_later(
+    pytester: pytest.Pytester,
+) -> None:
     pytester.makepyfile(FALLING)
-    run_pytest(pytester, f"{TWICE} --sim=mujoco --sim-trace=on")
-    assert not (pytester.path / "o" / "recordings").exists()
+    (pytester.mkdir("o") / "recordings").touch()
+    result = run_pytest(pytester, f"{TWICE} --sim=mujoco --sim-record=mcap", ret=1, passed=1)
+    result.stdout.fnmatch_lines(["no recording in *o/recordings: File exists"])
+    assert "no traces" not in result.stdout.str()
+    (pytester.path / "o" / "recordings").unlink()
     result = simbench(pytester, "report", "o", "--record=mcap")
     assert result.ret == 0
     result.stdout.fnmatch_lines(["2 recordings: o/recordings"])
@@ -71,14 +76,6 @@ def test_a_kept_run_is_recorded_later(pytester: pytest.Pytester) -> None:
 def test_a_run_without_traces_says_so(tmp_path: Path) -> None:
     told = ["no recordings: the run has no traces; see --sim-trace"]
     assert recordings(tmp_path, tmp_path, [record()]) == (told, True)
-
-
-def test_a_recording_that_cannot_be_written_fails_the_run(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(FALLING)
-    (pytester.mkdir("o") / "recordings").touch()
-    result = run_pytest(pytester, f"{TWICE} --sim=mujoco --sim-record=mcap", ret=1, passed=1)
-    result.stdout.fnmatch_lines(["no recording in *o/recordings: File exists"])
-    assert "no traces" not in result.stdout.str()
 
 
 @pytest.mark.usefixtures("drawn")

@@ -91,6 +91,7 @@ def test_what_is_no_trace_is_refused(changes: Any, message: str, tmp_path: Path)
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
+        ("phases", [[-1e300, "pick"]], "its time is not from 0 to"),
         ("parent", "panda_link1", "hangs on none before it"),
         ("axis", [0.0, 0.0, 0.0], "division by zero"),
         ("axis", ["x", "y", "z"], "'hinges.0..axis.0.': expected 'float', got 'str'"),
@@ -98,25 +99,14 @@ def test_what_is_no_trace_is_refused(changes: Any, message: str, tmp_path: Path)
         ("origin", {"quaternion": [2, 0, 0, 0]}, "the quaternion of the joint 'panda_joint1' has"),
     ],
 )
-def test_a_robot_that_cannot_be_is_refused(
+def test_a_robot_or_phase_that_cannot_be_is_refused(
     key: str, value: Any, message: str, tmp_path: Path
 ) -> None:
     wire = trace().figure.to_wire()
     wire["hinges"][0][key] = value
-    spoilt(tmp_path / "x.npz", about=about(tmp_path / "y.npz", figure=wire))
+    told = {"phases": value} if key == "phases" else {"figure": wire}
+    spoilt(tmp_path / "x.npz", about=about(tmp_path / "y.npz", **told))
     with pytest.raises(TraceError, match=message):
-        Trace.read(tmp_path / "x.npz")
-
-
-def test_a_phase_at_no_time_is_refused(tmp_path: Path) -> None:
-    spoilt(tmp_path / "x.npz", about=about(tmp_path / "y.npz", phases=[[-1e300, "pick"]]))
-    with pytest.raises(TraceError, match="its time is not from 0 to"):
-        Trace.read(tmp_path / "x.npz")
-
-
-def test_what_is_no_file_of_arrays_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "x.npz").write_text("no zip")
-    with pytest.raises(TraceError, match="holds no arrays"):
         Trace.read(tmp_path / "x.npz")
 
 
