@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 from fnmatch import fnmatchcase
@@ -20,6 +19,11 @@ from tests.cli.command import said
 from tests.motion.small_arm import URDF, small_arm
 
 NAMES = [command.name for command in COMMANDS]
+
+
+@pytest.fixture(autouse=True)
+def no_environments(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path / "environments"))
 
 
 def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
@@ -121,17 +125,13 @@ def test_what_cannot_be_is_one_sentence(
     (tmp_path / "seen").mkdir()
     (tmp_path / "seen" / "watch.json").write_text('{"seen": 1}')
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path / "environments"))
     status, _, told = said(capsys, *words.split())
     assert status == 2
     assert told.count("\n") == 1
     assert fnmatchcase(told.splitlines()[-1], sentence)
 
 
-def test_the_list_is_a_table(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
+def test_the_list_is_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = said(capsys, "list")
     heading, *lines = out.splitlines()
     assert status == 0
@@ -145,10 +145,7 @@ def test_the_list_is_a_table(
         assert f"no: not here; simbench list {name} says how to get it\n" in out
 
 
-def test_one_simulator_is_told_whole(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
+def test_one_simulator_is_told_whole(capsys: pytest.CaptureFixture[str]) -> None:
     name = next(name for name in registered() if adapter(name).info.requirements)
     _, out, _ = said(capsys, "list", name)
     assert f"not there yet: simbench install {name}" in out
@@ -185,10 +182,7 @@ def test_robots_and_their_files(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert "    not used of the URDF: damping and friction of turn, lift (<dynamics>)\n" in out
 
 
-def test_environments_come_and_go(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
+def test_environments_come_and_go(capsys: pytest.CaptureFixture[str]) -> None:
     name = f"mujoco=={adapter('mujoco').info.tested_version}"
     environment = Environment.of(adapter(name).info)
     (environment.folder / "bin").mkdir(parents=True)
@@ -196,7 +190,7 @@ def test_environments_come_and_go(
     told = {"requirements": list(environment.info.requirements)}
     (environment.folder / MARKER).write_text(json.dumps(told))
     assert said(capsys, "environments") == (
-        0, f"{name}: 0 MB, MuJoCo None\n0 MB in {tmp_path}\n", ""
+        0, f"{name}: 0 MB, MuJoCo None\n0 MB in {environment.folder.parent}\n", ""
     )  # fmt: skip
     assert said(capsys, "uninstall", name) == (0, f"{name}: removed, 0 MB\n", "")
     assert "choose from none is there" in said(capsys, "uninstall", name)[2]
@@ -216,18 +210,16 @@ def test_an_interruption_is_one_sentence(
     assert said(capsys, *words) == (130, "", told)
 
 
-def test_a_reader_that_ends_early_is_no_fault(tmp_path: Path) -> None:
+def test_a_reader_that_ends_early_is_no_fault() -> None:
     command = f"'{sys.executable}' -m pytest_simbench list -v | head -1"
-    environment = {**os.environ, "SIMBENCH_ENVIRONMENTS": str(tmp_path)}
-    found = subprocess.run(command, shell=True, capture_output=True, text=True, env=environment)
+    found = subprocess.run(command, shell=True, capture_output=True, text=True)
     assert found.stderr == ""
 
 
-def test_a_full_disk_is_one_sentence(tmp_path: Path) -> None:
+def test_a_full_disk_is_one_sentence() -> None:
     command = [sys.executable, "-m", "pytest_simbench", "list"]
-    environment = {**os.environ, "SIMBENCH_ENVIRONMENTS": str(tmp_path)}
     with open("/dev/full", "w") as full:
-        found = subprocess.run(command, stdout=full, stderr=-1, text=True, env=environment)
+        found = subprocess.run(command, stdout=full, stderr=-1, text=True)
     told = "simbench list: the output could not be written (No space left on device)\n"
     assert (found.returncode, found.stderr) == (1, told)
 

@@ -34,17 +34,21 @@ def test_the_experiment_is_the_same_on_the_node(case: Case, tmp_path: Path) -> N
     assert replace(expected(there, 3), scene="") == replace(expected(experiment, 3), scene="")
 
 
-def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
-    """The node has neither the test nor what its class is derived from."""
-    packed = Job.of(Experiment(case, Falling(0.25))).pack().data
+def of_node(experiment: Experiment, asked: str) -> str:
+    """What a process elsewhere prints of the task that reached it."""
     code = (
         "import sys; from pytest_simbench.cluster.job import Job\n"
-        "job = Job.unpack(sys.stdin.buffer.read())\n"
-        "print(job.task, [metric.name for metric in job.task.metrics])"
+        f"task = Job.unpack(sys.stdin.buffer.read()).task\nprint({asked})"
     )
-    command = [sys.executable, "-P", "-c", code]
+    packed, command = Job.of(experiment).pack().data, [sys.executable, "-P", "-c", code]
     out = subprocess.run(command, input=packed, capture_output=True, check=True, cwd="/").stdout
-    assert out.decode().strip() == "Falling(duration=0.25) ['landed']"
+    return out.decode().strip()
+
+
+def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
+    """The node has neither the test nor what its class is derived from."""
+    asked = "task, [metric.name for metric in task.metrics]"
+    assert of_node(Experiment(case, Falling(0.25)), asked) == "Falling(duration=0.25) ['landed']"
 
 
 @pytest.mark.parametrize("name", ["still", "wrapped"])
@@ -56,14 +60,7 @@ def test_so_does_the_policy_of_a_file(case: Case, tmp_path: Path, name: str) -> 
         "policies = {'still': Still(), 'wrapped': act}\n"
     )
     (policy,) = read_policies(path, name)
-    packed = Job.of(Experiment(case, Reaching(policy))).pack().data
-    code = (
-        "import sys; from pytest_simbench.cluster.job import Job\n"
-        "print(Job.unpack(sys.stdin.buffer.read()).task.policy.act(3))"
-    )
-    command = [sys.executable, "-P", "-c", code]
-    out = subprocess.run(command, input=packed, capture_output=True, check=True, cwd="/").stdout
-    assert out.decode().strip() == "3"
+    assert of_node(Experiment(case, Reaching(policy)), "task.policy.act(3)") == "3"
 
 
 def test_a_class_that_travelled_can_be_derived_from(case: Case) -> None:

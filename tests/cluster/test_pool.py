@@ -65,7 +65,7 @@ def test_a_worker_of_somebody_elses_is_no_node() -> None:
     assert Node.of("tcp://other:1", "other", {"GPU": 2.0}) is None
 
 
-def test_a_simulator_that_nobody_has_is_named_with_what_each_has() -> None:
+def test_what_nobody_has_or_in_several_versions_is_named_with_what_each_has() -> None:
     nodes = [lab("lab1", "mujoco==3.3.7"), lab("lab2", "drake==1.51.1", "display", "vulkan")]
     assert unmet(nodes, "mujoco", ["headless"]) is None
     assert unmet(nodes, "sapien", ["headless"]) == (
@@ -76,9 +76,6 @@ def test_a_simulator_that_nobody_has_is_named_with_what_each_has() -> None:
     assert str(unmet(nodes, "mujoco", ["gui"])).startswith(
         "no node of the cluster offers mujoco with a display: "
     )
-
-
-def test_two_versions_of_an_engine_do_not_make_one_result() -> None:
     nodes = [lab("lab1", "mujoco==3.3.7"), lab("lab2", "mujoco==3.4.0"), lab("lab3")]
     assert "3.3.7 (lab1), 3.4.0 (lab2)" in str(unmet(nodes, "mujoco", ["headless"]))
 
