@@ -102,8 +102,7 @@ class Attack:
         try:
             episode = self.episodes.run(perturbed)
         except WorkerError as error:
-            tape = self.episodes.handle.tape
-            return Trial(1.0, f"ends in {type(error).__name__}", kept=0.0, tape=tape)
+            return Trial(1.0, f"ends in {type(error).__name__}", 0.0, self.episodes.handle.tape)
         found = changed(self.base.counts, episode.counts)
         task = self.episodes.task
         return Trial(
