@@ -152,7 +152,7 @@ def not_taken(address: str, name: str, error: BaseException) -> str:
     """That no head takes the node; why one refuses it stands in the log of Dask alone."""
     reason = _reason(error)
     told = f"no head at {address} takes this node ({reason})"
-    if reason.startswith("Worker failed to start"):
+    if "name taken" in reason or reason.startswith("Worker failed to start"):
         told += f"; if Dask says above that the name {name!r} is taken, give another --name"
     return told
 
