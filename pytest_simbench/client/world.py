@@ -95,11 +95,11 @@ class World:
         self._enter("task")  # between the phases that the task names
         self._after_phase = after_phase
 
-    def _take(self, answer: Mapping[str, Any]) -> None:
+    def _take(self, answer: Mapping[str, Any], striking: bool = False) -> None:
         self.time = float(answer["time"])
         self.joints: FloatArray = answer["joints"]
         self.bodies: FloatArray = answer["bodies"]
-        wrong = implausible(self.scene, self.bodies)
+        wrong = implausible(self.scene, self.bodies, striking)
         if wrong is not None:
             raise Diverged(
                 f"{wrong}, at t = {self.time:.3f} s; a smaller timestep may help",
@@ -180,16 +180,18 @@ class World:
         __tracebackhide__ = True
         return self._move("follow", log_period, **vars(trajectory))
 
-    def wait(self, duration: float, *, log_period: float | None = None) -> Motion:
+    def wait(
+        self, duration: float, *, log_period: float | None = None, striking: bool = False
+    ) -> Motion:
         """Let `duration` [s] of simulated time pass under the last command; the motion as of
-        `follow`.
+        `follow`. Where bodies are `striking` each other at its end, nobody looks how deep.
 
         Raises:
             SceneError: the duration is no number, not finite, or negative.
         """
         __tracebackhide__ = True
         check_number(duration, "the duration [s] of a wait", 0.0, LONGEST)
-        return self._move("wait", log_period, duration=float(duration))
+        return self._move("wait", log_period, striking, duration=float(duration))
 
     def control(
         self,
@@ -267,7 +269,9 @@ class World:
         """No samples."""
         return Motion(np.empty(0), self.joints[None][:0], self.bodies[None][:0])
 
-    def _move(self, operation: str, log_period: float | None, **arguments: Any) -> Motion:
+    def _move(
+        self, operation: str, log_period: float | None, striking: bool = False, **arguments: Any
+    ) -> Motion:
         __tracebackhide__ = True
         if log_period is not None:
             check_number(log_period, "the log_period [s] of a motion", 0.0)
@@ -284,7 +288,7 @@ class World:
                 self.trace.append(self._thinned(motion))  # also where it ends in what cannot be
             if log_period is not None:
                 motions.append(motion)
-        self._take(answer)
+        self._take(answer, striking)
         return Motion.joined(motions or [self._still()])
 
     def _parts(self, duration: float, period: float) -> list[float]:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from pytest_simbench.measure import crashes
 from pytest_simbench.measure.comparison import (
@@ -183,14 +184,14 @@ def run_gate(
     if not common and (limits or typed):
         broken.append(_nothing_in_common(before, after))
     for limit, of_limit in found.items():
-        reasons = {test: why for test, why in of_limit.items() if isinstance(why, str)}
+        reasons = {test: why for test, why in of_limit.items() if isinstance(why, Untested)}
         if common and len(reasons) == len(common):
             (broken if typed else notes).append(f"{limit} compared nothing: {_told(reasons)}")
         else:
-            apart = {test: why for test, why in reasons.items() if why != UNKNOWN}
-            for test, why in apart.items():
-                lost = typed and why.endswith((GONE, FEW)) and after[test].ok
-                (broken if lost else notes).append(f"{test}: {limit} is not tested: {why}")
+            apart = {test: untested for test, untested in reasons.items() if untested != UNKNOWN}
+            for test, (why, lost) in apart.items():
+                fails = typed and lost and after[test].ok
+                (broken if fails else notes).append(f"{test}: {limit} is not tested: {why}")
     number = max(1, sum(change.by_chance for change in changes))
     notes += [
         f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
@@ -253,13 +254,13 @@ def _nothing_in_common(before: Iterable[str], after: Iterable[str]) -> str:
     )
 
 
-def _told(reasons: Mapping[str, str]) -> str:
+def _told(reasons: Mapping[str, Untested]) -> str:
     """Why tests were not compared, each reason once, with the tests."""
-    tests = grouped(reasons, lambda test: reasons[test])
+    tests = grouped(reasons, lambda test: reasons[test].why)
     return "; ".join(f"{why} ({', '.join(found)})" for why, found in tests.items())
 
 
-def _corrected(found: Iterable[Change | str], error: float = 1.0) -> tuple[Change, ...]:
+def _corrected(found: Iterable[Change | Untested], error: float = 1.0) -> tuple[Change, ...]:
     """The changes, with the p values of those that chance could bring corrected for their number,
     where they have that share of the error."""
     changes = [change for change in found if isinstance(change, Change)]
@@ -301,35 +302,45 @@ def _rises(
 NO_MORE = Limit(CRASHED.name, 0.0, True)
 """What holds of crashes when nobody says anything: their share may not rise."""
 
-UNKNOWN, GONE = "it is not measured there", "no repetition of this run has a value"
 PAIRS = math.ceil(math.log2(1 / ALPHA))
 """With fewer no change is significant, however large: 5."""
-FEW = f"and a change takes {PAIRS} pairs or more"
+
+
+class Untested(NamedTuple):
+    """Why a metric of a test is not compared; `lost`: this run lacks values that it should have."""
+
+    why: str
+    lost: bool = False
+
+
+UNKNOWN = Untested("it is not measured there")
+GONE = Untested("no repetition of this run has a value", lost=True)
 
 
 def _change(
     test: str, old: ResultSet, new: ResultSet, limit: Limit, *, both_ways: bool = False
-) -> Change | str:
+) -> Change | Untested:
     """The change of one metric, not yet corrected; else why there is none."""
     if not (limit.metric in old.known and limit.metric in new.known):
         return GONE if any(limit.metric in record.metrics for record in old.ok) else UNKNOWN
     metric = new.metric(limit.metric)
     if metric.better is None:
-        return "neither direction of it is worse"
+        return Untested("neither direction of it is worse")
     if _of_machines(old, new, metric.name):
-        return (
+        return Untested(
             "it depends on the machine, which was another one, and not every repetition has the "
             "control workload that takes the machine's speed out"
         )
     if not old.values(metric):
-        return "no repetition of the baseline has a value"
+        return Untested("no repetition of the baseline has a value")
     if not new.values(metric):
         return GONE
     comparison, evened = compared(metric, old, new, both_ways=both_ways)
     had, ended = len(old.values(metric)), len(new.ok)
     have = sum(new.value(record, metric) is not None for record in new.ok)
     if have < ended and min(had, ended) >= PAIRS and _smallest_p(comparison) > ALPHA:
-        return f"{have} of {ended} repetitions of this run have a value, {FEW}"
+        told = f"{have} of {ended} repetitions of this run have a value"
+        return Untested(f"{told}, and a change takes {PAIRS} pairs or more", lost=True)
     loss = limit.loss(metric, comparison.first, comparison.second)
     return Change(test, metric, limit, comparison, comparison.p_value, loss, evened)
 

@@ -31,11 +31,12 @@ FASTEST = 30.0
 ceiling of the room."""
 
 
-def implausible(scene: Scene, bodies: FloatArray) -> str | None:
+def implausible(scene: Scene, bodies: FloatArray, striking: bool = False) -> str | None:
     """Why these states of the free bodies cannot be, as a sentence; None when they can.
 
     Looked at after every motion and wait, in the pytest process: under a millisecond for 21
-    cubes. What is only there for a moment, the depth of a hard impact, is not looked for.
+    cubes. Where bodies are `striking` each other right then, how deep they are in each other is not
+    looked at: soft contacts stop a marble of 16 mm 16 mm deep.
     States are rows as of `World.bodies`, (n_free, 13).
     """
     if not len(bodies):
@@ -60,7 +61,7 @@ def implausible(scene: Scene, bodies: FloatArray) -> str | None:
     )
     for k in np.flatnonzero(speed > FASTEST):
         return f"{free[k].name!r} moves at {speed[k]:.3g} m/s, and nothing here can be so fast"
-    return _too_deep(scene, bodies)
+    return None if striking else _too_deep(scene, bodies)
 
 
 def _too_deep(scene: Scene, bodies: FloatArray) -> str | None:

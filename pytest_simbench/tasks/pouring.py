@@ -141,7 +141,7 @@ class Pouring(Task):
             world.wait(UPRIGHT / SPIN)
         inside = self.within(world.pose("cup"), _centres(world, names))
         with world.phase("pour"):
-            world.wait((self.tilt - UPRIGHT) / SPIN)
+            world.wait((self.tilt - UPRIGHT) / SPIN, striking=True)
         world.mark("end")
         with world.phase("settle"):
             world.wait(self.settle)

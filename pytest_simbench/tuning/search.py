@@ -7,7 +7,6 @@ trials again; what is recorded it does not repeat, and then goes on as it would 
 from __future__ import annotations
 
 import json
-import math
 import time
 import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -25,6 +24,9 @@ from pytest_simbench.tuning.trials import Candidate, Trials
 
 STARTUP = 10
 """Trials before the sampler learns from them."""
+
+IDLE = 100
+"""Trials in a row that bring only what was looked at, after which a search ends."""
 
 FEWEST = 3
 """Candidates that a budget must be enough for."""
@@ -83,7 +85,7 @@ class Search:
 
     def run(self, seconds: float, most: int | None = None) -> list[Candidate]:
         """Search for so long, or until there are so many trials, those of an earlier call count, or
-        no other values. The first of the candidates are today's settings.
+        no new values come. The first of the candidates are today's settings.
 
         Raises:
             TuningError: no Optuna, nothing that runs, or too little time.
@@ -100,10 +102,8 @@ class Search:
                 f"give a budget of at least {1 + 4 * took / 60:.0f}min for each simulator"
             )
         study = self._study(library)
-        known, number = {self._key({}): today}, 0
-        choices = [len(one.over) for one in self.space if isinstance(one.over, tuple)]
-        every = math.prod(choices) if len(choices) == len(self.space) else math.inf
-        while number != most and len(known) < every:
+        known, number, latest = {self._key({}): today}, 0, 0
+        while number != most and number - latest < IDLE:
             if time.monotonic() - began + self.trials.runs.spent >= seconds:
                 break
             if number % 2 and number == len(study.trials):
@@ -115,6 +115,7 @@ class Search:
                 known[key] = self.trials.choose(f"trial{number}", asked, self.done)
                 self.done.append(known[key])
                 self.tell(known[key], front(self.done, self.trials))
+                latest = number
             cost = min(known[key].cost(), 10 * today.cost())  # also of one that failed at once
             study.tell(trial, (cost, self.trials.error(known[key])))
             number += 1

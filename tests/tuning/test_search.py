@@ -72,9 +72,10 @@ def test_it_goes_on_as_if_it_had_not_been_interrupted(tmp_path: Path) -> None:
 
 
 def test_one_setting_may_be_searched_alone(tmp_path: Path) -> None:
-    """One of two values ends at once."""
+    """One of few values ends when all were tried."""
     pytest.importorskip("optuna")
     assert len(search(tmp_path / "a", over="cone")[0].run(1e9)) == 2
+    assert len(search(tmp_path / "c", over="noslip_iterations")[0].run(1e9)) == 21
     assert len(search(tmp_path / "b", over="timestep")[0].run(1e9, 12)) > 8
 
 
