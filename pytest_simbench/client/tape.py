@@ -27,7 +27,8 @@ class Operation:
 
     Attributes:
         kind: `follow` or `wait`.
-        arguments: as sent to the worker: tick and arrays of a trajectory, duration of a wait [s].
+        arguments: as sent to the worker: tick and arrays of a trajectory, duration of a wait [s];
+            and of `World.wait` what is not sent.
         phase: of the task, as its `World.phase` named it.
     """
 

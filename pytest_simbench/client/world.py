@@ -191,7 +191,8 @@ class World:
         """
         __tracebackhide__ = True
         check_number(duration, "the duration [s] of a wait", 0.0, LONGEST)
-        return self._move("wait", log_period, striking, duration=float(duration))
+        ends = {"striking": True} if striking else {}
+        return self._move("wait", log_period, duration=float(duration), **ends)
 
     def control(
         self,
@@ -270,7 +271,7 @@ class World:
         return Motion(np.empty(0), self.joints[None][:0], self.bodies[None][:0])
 
     def _move(
-        self, operation: str, log_period: float | None, striking: bool = False, **arguments: Any
+        self, operation: str, log_period: float | None, *, striking: bool = False, **arguments: Any
     ) -> Motion:
         __tracebackhide__ = True
         if log_period is not None:

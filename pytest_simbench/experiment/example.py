@@ -209,7 +209,8 @@ def _operation(told: Any, joints: int) -> Operation:
     phase = _known(told, "phase", str)
     wanted = {"wait": {"duration"}, "follow": {"tick", *ARRAYS}}.get(kind)
     _check(wanted is not None, f"an operation is {kind!r}, neither 'follow' nor 'wait'")
-    _check(set(arguments) == wanted, f"an operation {kind!r} has {sorted(arguments)}")
+    fits = set(arguments) - {"striking"} == wanted and arguments.get("striking", True) is True
+    _check(fits, f"an operation {kind!r} has {sorted(arguments)}")
     length, longest = ("duration", LONGEST_WAIT) if kind == "wait" else ("tick", LONGEST_MOTION)
     number = arguments[length]
     _check(

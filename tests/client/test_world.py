@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -22,7 +22,7 @@ from pytest_simbench.client.tape import ARRAYS, Latency, Operation
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
-from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.scene import Pose, Scene, Sphere
 from pytest_simbench.tasks.base import cube
 
 SCENE = Scene("s", (cube("a", Pose.at(0.0, 0.0, 2.0), (1.0,) * 4),))
@@ -30,7 +30,7 @@ SCENE = Scene("s", (cube("a", Pose.at(0.0, 0.0, 2.0), (1.0,) * 4),))
 
 @contextmanager
 def opened(
-    case: Case, scene: Scene = SCENE, period: float | None = None, **changes: float
+    case: Case, scene: Scene = SCENE, period: float | None = None, **changes: Any
 ) -> Iterator[World]:
     """A world in a worker of its own, whose motion is kept with this period [s]."""
     process = WorkerProcess(case.launch("x"), Where(case.simulator, case.mode))
@@ -63,6 +63,18 @@ def test_what_went_wrong_is_in_it(case: Case) -> None:
     with opened(case, blown, 0.02) as world, pytest.raises(Diverged, match="left the room"):
         world.wait(0.4)
     assert Motion.joined(world.trace).bodies[-1, 0, 0] > 5.0
+
+
+def test_an_impact_is_no_divergence_where_the_task_says_so(case: Case) -> None:
+    """MuJoCo's default contacts stop a marble only when it is deep in the ground."""
+    marble = Sphere("m", 0.008, Pose.at(0.0, 0.0, 0.01), 0.005, linear_velocity=(0.0, 0.0, -2.4))
+    for striking in (True, False):
+        with opened(case, Scene("s", (marble,)), solref=(0.02, 1.0)) as world:
+            with nullcontext() if striking else pytest.raises(Diverged, match="deep in the ground"):
+                world.wait(0.012, striking=striking)
+            if striking:
+                world.wait(1.0)
+                assert world.bodies[0, 2] == pytest.approx(0.008, abs=1e-3)
 
 
 def test_a_long_wait_is_kept_out_of_the_simulators_memory(case: Case) -> None:

@@ -116,12 +116,15 @@ def test_a_crash_is_replayed_up_to_it(handle: SimulatorHandle, tmp_path: Path) -
         world.wait(0.1)
         assert world.process.pid is not None
         os.kill(world.process.pid, signal.SIGKILL)
-        world.wait(0.2)
+        world.wait(0.2, striking=True)
     assert "replay this episode" in caught.value.__notes__[0]
     (path,) = (tmp_path / "examples").iterdir()
     example = read_example(path, tmp_path)
     assert example.scene == SCENE
-    assert [operation.duration for operation in example.tape] == [0.1, 0.2]
+    assert [dict(operation.arguments) for operation in example.tape] == [
+        {"duration": 0.1},
+        {"duration": 0.2, "striking": True},
+    ]
     with handle.episode(SCENE) as world:
         world.wait(0.1)
 
@@ -283,6 +286,7 @@ BROKEN: list[tuple[tuple[Any, ...], Any, str]] = [
     (("tape", 0, "arguments"), {"duration": 1e9}, "it takes up to 86400 s"),
     (("tape", 0, "arguments"), {"duration": True}, "has the duration True"),
     (("tape", 0, "arguments"), {"duration": 1, "op": "close"}, "an operation 'wait' has ["),
+    (("tape", 0, "arguments"), {"duration": 1, "striking": 1}, "an operation 'wait' has ["),
     (("tape", 0), {"kind": "follow", "arguments": FOLLOW, "phase": ""}, "is no array of 0 joints"),
 ]  # fmt: skip
 
