@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from importlib.metadata import version
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from pytest_simbench.cli.names import read_names
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.client import environments
+from pytest_simbench.client.errors import Where, WorkerError
+from pytest_simbench.client.process import WorkerProcess
+from pytest_simbench.experiment.case import Case
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.report.model.capabilities import columns
 from pytest_simbench.report.terminal.grid import aligned, fill, render
@@ -146,16 +150,25 @@ def _place(name: str, builds: dict[str, str]) -> str:
     other = environments.outside(info) if environments.interpreter(info) else None
     place = other.place if other else "installed"
     found = _version(name)
-    if not found:  # no Python package tells it: the engine does, when it runs
-        return f"version not known before it runs, {place}"
+    if not found:
+        return f"version not known, {place}"
     return f"version {found}{'' if info.tested(found) else ', UNTESTED'}, {place}"
 
 
 def _version(name: str) -> str | None:
-    """The engine's version, if its Python package tells it."""
+    """The engine's version, as its Python package tells it; else itself, in a worker."""
     info = adapter(name).info
     other = environments.outside(info) if environments.interpreter(info) else None
-    try:
-        return other.version() if other else version(info.distribution)
-    except Exception:  # not there, or metadata that nobody can read
-        return None
+    with suppress(Exception):  # not there, or metadata that nobody can read
+        if found := other.version() if other else version(info.distribution):
+            return found
+    with TemporaryDirectory() as folder:
+        profile, here = next(iter(adapter(name).profiles)), Path(folder)
+        case = Case.of(name, profile=profile, test="list", mode="headless", folder=here)
+        process = WorkerProcess(case.launch(name), Where(name, case.mode))
+        try:
+            return process.construct(profile).versions.get(info.distribution)
+        except WorkerError:  # a run will say why
+            return None
+        finally:
+            process.close()

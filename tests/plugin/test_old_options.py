@@ -78,5 +78,5 @@ def test_an_untested_version_runs_and_is_named(
     result.stdout.fnmatch_lines(["*UNTESTED VERSION: mujoco * is here, the*"])
     result = simbench(pytester, "list", "-v")
     result.stdout.fnmatch_lines(
-        ["newer: *", "*UNTESTED*", "unlisted: *", "    version not known before it runs, installed"]
+        ["newer: *", "*UNTESTED*", "unlisted: *", "    version not known, installed"]
     )
