@@ -120,7 +120,8 @@ def built(subject: Subject, fault: Fault, found: ParityResult) -> str:
     if fault.quantity in found.wrong:
         return "parity"
     if fault.quantity not in found.untold:
-        return "**missed**"
+        lacks = {d.only for d in subject.cls.info.deviations if d.only}
+        return "has none" if fault.word in lacks else "**missed**"
     if fault.needs is Capability.SELF_COLLIDE:
         return by_law(subject, "links_collide_when_asked")
     return silent(subject, fault.quantity)

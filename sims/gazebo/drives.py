@@ -2,7 +2,10 @@
 
 A velocity command is a constraint of the engine, solved together with the contacts, the joint's
 effort limit the largest force. It holds for one step. So each step tells each joint
-v* + gain (q* - h v* - q) / h, as Gazebo's ros2_control does it (its gain is 0.1).
+v* + gain (q* - h v* - q) / h, as Gazebo's ros2_control does it (its gain is 0.1). Without a gain of
+the settings it is h k / (h k + d), at which the scene's drive law (`scene.Joint`) asks for no
+effort. A higher one (0.5, 500/s against k / d = 10/s) brakes too late once the effort saturates:
+joint 1 of the Panda went 92 % of its way too far.
 
 And forces and torques on free bodies, each for one step: those of the scene, and those that give
 what Gazebo's engines do not have, a velocity at the start and damping.
@@ -19,13 +22,17 @@ from pytest_simbench.scene import Body, FloatArray, Robot, rotation_matrix
 from .server import Server, bindings
 
 
+WEAKEST = 1e-9
+"""Of a joint that has no drive of its own [N m s/rad or N s/m]."""
+
+
 class Drives:
     """The drives of a robot.
 
     Args:
         model: of the robot, an entity of the bindings.
         timestep: [s].
-        gain: share of the position error that a step corrects.
+        gain: share of the position error that a step corrects; None: as the drive law does.
         coupled: whether the engine couples the fingers; else the others are led by the first.
 
     Attributes:
@@ -34,7 +41,13 @@ class Drives:
     """
 
     def __init__(
-        self, server: Server, model: Any, robot: Robot, timestep: float, gain: float, coupled: bool
+        self,
+        server: Server,
+        model: Any,
+        robot: Robot,
+        timestep: float,
+        gain: float | None,
+        coupled: bool,
     ) -> None:
         self.ecm, self._names = server.ecm, robot.joint_names
         self.joints = [
@@ -48,9 +61,11 @@ class Drives:
         fingers = [index(name) for name in robot.gripper.joints]
         self._first = fingers[0] if fingers else -1
         self._led = [] if coupled else fingers[1:]
-        self._gain, self._share = gain / timestep, 1 - gain
+        k, d = timestep * robot.column("stiffness"), robot.column("damping")
+        gains = k / np.maximum(k + d, WEAKEST) if gain is None else np.full(len(k), gain)
+        self._gain, self._share = gains / timestep, 1 - gains
         self._told = [
-            (joint.position, joint.set_velocity)
+            (joint.position, joint.set_velocity, float(self._gain[number]))
             for number, joint in enumerate(self.joints)
             if number not in self._led
         ]
@@ -65,8 +80,8 @@ class Drives:
 
     def act(self) -> None:
         """Before a step: tell the joints what they are asked for."""
-        ecm, gain = self.ecm, self._gain
-        for (position, tell), asked in zip(self._told, self._asked, strict=True):
+        ecm = self.ecm
+        for (position, tell, gain), asked in zip(self._told, self._asked, strict=True):
             found = position(ecm)
             tell(ecm, [asked - gain * (found[0] if found else 0.0)])
         if self._led:
@@ -81,13 +96,14 @@ class Drives:
         ecm, first = self.ecm, self.joints[self._first]
         place = (first.position(ecm) or [0.0])[0]
         speed = (first.velocity(ecm) or [0.0])[0]
-        asked = self._asked[self._driven.index(self._first)] - self._gain * place
+        gain = float(self._gain[self._first])
+        asked = self._asked[self._driven.index(self._first)] - gain * place
         if asked > 0:
             speed = max(speed, asked)
         for number in self._led:
             joint = self.joints[number]
             behind = place - (joint.position(ecm) or [0.0])[0]
-            joint.set_velocity(ecm, [speed + self._gain * behind])
+            joint.set_velocity(ecm, [speed + gain * behind])
 
     def leads(self, first: str, other: str) -> bool:
         """Whether one joint is led by another."""

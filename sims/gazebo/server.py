@@ -17,7 +17,7 @@ import signal
 import sys
 import tempfile
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -26,6 +26,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 from uuid import uuid4
+from weakref import ref
 
 from pytest_simbench.simulator import SimulatorError, UnavailableError
 from pytest_simbench.simulator.base import signals_kept
@@ -111,13 +112,12 @@ class Server:
         self.name = name
         self.timestep = 0.0
         self._ecm: Any = None
-        self._steps = 0
         with tempfile.TemporaryDirectory(prefix="simbench-gazebo-") as folder, _told() as told:
             path = Path(folder) / "world.sdf"
             path.write_text(text, "utf-8")
             with signals_kept(*HANDLED):
                 self._fixture = bindings().sim.TestFixture(str(path))
-            self._fixture.on_pre_update(self._seen)
+            self._fixture.on_pre_update(_held_weakly(self))
             self._fixture.finalize()
             self._server = self._fixture.server()
             self._server.run(True, 1, False)
@@ -126,11 +126,6 @@ class Server:
             raise SimulatorError(f"Gazebo refused the world: {words}")
         self.ecm: Any = self._ecm
         self.world: Any = bindings().sim.World(bindings().sim.world_entity(self.ecm))
-
-    def _seen(self, info: Any, ecm: Any) -> None:
-        """Called by Gazebo in each step, before it acts."""
-        self._ecm, self._steps = ecm, info.iterations
-        self.timestep = info.dt.total_seconds()
 
     def reset(self) -> None:
         """Go back to the state that the file describes.
@@ -163,6 +158,18 @@ class Server:
         if not ok:
             raise SimulatorError(f"Gazebo did not answer its service {service}")
         return bytes(answer)
+
+
+def _held_weakly(server: Server) -> Callable[[Any, Any], None]:
+    """What Gazebo calls in each step, before it acts. A method of the server would keep it, and all
+    of Gazebo's world, for ever: 28 MB each."""
+    this = ref(server)
+
+    def seen(info: Any, ecm: Any) -> None:
+        if (server := this()) is not None:
+            server._ecm, server.timestep = ecm, info.dt.total_seconds()
+
+    return seen
 
 
 def new_name() -> str:

@@ -22,7 +22,7 @@ class GazeboSettings(Settings):
         detector: collision detector of dartsim; Gazebo's default is `ode`.
         solver: of dartsim: `dantzig` (pivoting) or `pgs` (projected Gauss-Seidel, 30 passes).
         position_gain: share of the position error that the drives correct in a step; the default
-            is that of gz_ros2_control, Gazebo has none.
+            is that of gz_ros2_control, Gazebo has none. None: what the scene's drive law corrects.
         torsional_friction: what bullet-featherstone holds against a spin about a contact's normal,
             as a share of the normal force; a pair has about twice as much [m]. SDF's default is 1,
             so nothing can be turned on the ground. dartsim has none.
@@ -32,11 +32,11 @@ class GazeboSettings(Settings):
     engine: Annotated[Literal["dartsim", "bullet-featherstone"], EACH] = "dartsim"
     detector: Annotated[Literal["ode", "fcl", "bullet", "dart"], DARTSIM] = "ode"
     solver: Annotated[Literal["dantzig", "pgs"], DARTSIM] = "dantzig"
-    position_gain: Annotated[float, Linear(0.05, 1)] = 0.1
+    position_gain: Annotated[float | None, Linear(0.05, 1)] = 0.1
     torsional_friction: float = 1.0
 
 
-TUNED = GazeboSettings(engine="bullet-featherstone", position_gain=0.5, torsional_friction=0.0)
+TUNED = GazeboSettings(engine="bullet-featherstone", position_gain=None, torsional_friction=0.0)
 
 PROFILES: Mapping[str, Settings] = {
     "default": GazeboSettings(),

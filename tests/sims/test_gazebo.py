@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 from pytest_simbench.sims.gazebo import server
 from pytest_simbench.sims.gazebo.sdf import Physics, robot_model, world_text
@@ -150,6 +151,16 @@ def test_it_starts_where_the_scene_does(worlds: Worlds) -> None:
 def test_what_gazebo_refuses_is_told_in_its_own_words(worlds: Worlds) -> None:
     with pytest.raises(EngineFailed, match="Gazebo refused the world: .*no_such_link"):
         worlds.load(SCENE, fault="refused")
+
+
+def test_worlds_leave_nothing_in_a_worker(worlds: Worlds) -> None:
+    """Each left 28 MB once."""
+    worlds.load(Scene("one", (CUBE,)))
+    process = psutil.Process(worlds.worker.pid)
+    before = process.memory_info().rss
+    for _ in range(3):
+        worlds.load(Scene("one", (CUBE,)))
+    assert process.memory_info().rss - before < 20e6
 
 
 def test_two_runs_do_not_meet(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,10 +14,10 @@ import pytest
 from pytest_simbench.simulator.registry import adapter, registered
 
 PUBLISHED = {
-    "coppeliasim": {"default": "2d3b75f8", "tuned": "552fe23e"},
+    "coppeliasim": {"default": "2d3b75f8", "tuned": "552fe23e", "real": "48756f54"},
     "dart": {"default": "898a4638", "tuned": "43e82ad0", "real": "43e82ad0"},
     "drake": {"default": "09441a8f", "tuned": "cf3c33e5", "real": "d8e9fec8"},
-    "gazebo": {"default": "3def4e2e", "tuned": "93d12aae", "real": "93d12aae"},
+    "gazebo": {"default": "3def4e2e", "tuned": "5fd809f9", "real": "5fd809f9"},
     "genesis": {
         "default": "de5dd03b",
         "tuned": "22a5088c",
