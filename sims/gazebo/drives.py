@@ -21,7 +21,6 @@ from pytest_simbench.scene import Body, FloatArray, Robot, rotation_matrix
 
 from .server import Server, bindings
 
-
 WEAKEST = 1e-9
 """Of a joint that has no drive of its own [N m s/rad or N s/m]."""
 

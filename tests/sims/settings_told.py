@@ -208,7 +208,7 @@ def told_gazebo(s: Any) -> Told:
         "engine": said("gz-physics-(.*?)-plugin"),
         "detector": said("<collision_detector>(.*?)<"),
         "solver": said("<solver_type>(.*?)<"),
-        "position_gain": s._drives._gain * s.settings.timestep,
+        "position_gain": one(s._drives._gain * s.settings.timestep),
     }
     if "<torsional>" in text:
         told["torsional_friction"] = float(said(r"<torsional>\s*<coefficient>(.*?)<"))
