@@ -160,9 +160,8 @@ def main() -> None:
     if TABLE.exists():
         with TABLE.open(newline="", encoding="utf-8") as file:
             rows = {row[WHAT]: row for row in csv.DictReader(file)}
-    known = {name for row in rows.values() for name in row} - {WHAT}
     with TABLE.open("w", newline="", encoding="utf-8") as file:
-        columns = [WHAT, *sorted(known | {*names})]
+        columns = [WHAT, *sorted({*names}.union(*rows.values()) - {WHAT})]
         writer = csv.DictWriter(file, columns, "not measured", lineterminator="\n")
         writer.writeheader()
         for what in [*(fault.what for fault in FAULTS.values()), *IN_THE_ENGINE, *IN_TIME]:

@@ -150,9 +150,8 @@ def _place(name: str, builds: dict[str, str]) -> str:
     other = environments.outside(info) if environments.interpreter(info) else None
     place = other.place if other else "installed"
     found = _version(name)
-    if not found:
-        return f"version not known, {place}"
-    return f"version {found}{'' if info.tested(found) else ', UNTESTED'}, {place}"
+    untested = ", UNTESTED" if found and not info.tested(found) else ""
+    return f"version {found or 'not known'}{untested}, {place}"
 
 
 def _version(name: str) -> str | None:
@@ -162,13 +161,9 @@ def _version(name: str) -> str | None:
     with suppress(Exception):  # not there, or metadata that nobody can read
         if found := other.version() if other else version(info.distribution):
             return found
-    with TemporaryDirectory() as folder:
+    with TemporaryDirectory() as folder, suppress(WorkerError):  # a run will say why
         profile, here = next(iter(adapter(name).profiles)), Path(folder)
         case = Case.of(name, profile=profile, test="list", mode="headless", folder=here)
-        process = WorkerProcess(case.launch(name), Where(name, case.mode))
-        try:
+        with closing(WorkerProcess(case.launch(name), Where(name, case.mode))) as process:
             return process.construct(profile).versions.get(info.distribution)
-        except WorkerError:  # a run will say why
-            return None
-        finally:
-            process.close()
+    return None

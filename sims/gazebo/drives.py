@@ -63,12 +63,11 @@ class Drives:
         k, d = timestep * robot.column("stiffness"), robot.column("damping")
         gains = k / np.maximum(k + d, WEAKEST) if gain is None else np.full(len(k), gain)
         self._gain, self._share = gains / timestep, 1 - gains
-        self._told = [
-            (joint.position, joint.set_velocity, float(self._gain[number]))
-            for number, joint in enumerate(self.joints)
-            if number not in self._led
-        ]
         self._driven = [n for n in range(len(self.joints)) if n not in self._led]
+        self._told = [
+            (self.joints[n].position, self.joints[n].set_velocity, float(self._gain[n]))
+            for n in self._driven
+        ]
         self._state = np.stack([self.zeros, 0 * self.zeros])
         self.command(self.zeros, 0 * self.zeros)
 
