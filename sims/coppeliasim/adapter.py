@@ -51,7 +51,9 @@ class CoppeliaSim(Simulator):
         language="C++",
         tested_version="4.10.0",
         oldest_version="4.10.0",
-        capabilities=Capability.named("contact_count contact_forces deterministic compound"),
+        capabilities=Capability.named(
+            "contact_count contact_forces deterministic compound couplings"
+        ),
         deviations=(
             Deviation("body/*/margin link/*/margin", "the program tells no margin of shapes"),
             Deviation("*/restitution", "neither ODE nor MuJoCo, as the program has them, bounce"),

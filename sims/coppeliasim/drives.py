@@ -38,6 +38,8 @@ class Drives:
     Attributes:
         commanded: the last set points: position, velocity, effort.
         handles: of the joints, in the robot's order.
+        ends: the links before and behind each, and its kind.
+        forced: whether each is told its force.
         led: for each other finger, by number, that which leads it; none where the engine couples.
     """
 
@@ -55,40 +57,39 @@ class Drives:
                 f"coppeliasim.drive=force needs engine=mujoco, not {settings.engine}: the other "
                 "engines damp no joints; choose drive=velocity or drive=position"
             )
-        if not self.own and any(
+        passive = any(
             joint.passive_damping or joint.friction or joint.spring or joint.gravity != 1
             for joint in robot.joints
-        ):
+        )
+        if not self.own and (passive or robot.couplings):
             raise NotSupportedError(
                 f"coppeliasim with engine={settings.engine} gives joints no damping, friction or "
-                "springs, and links their whole weight; choose coppeliasim.engine=mujoco"
+                "springs, couples fingers alone, and gives links their whole weight; choose "
+                "coppeliasim.engine=mujoco"
             )
-        self._names = robot.joint_names
+        self._names, self._start = robot.joint_names, robot.column("initial_position")
         self.handles = [joints[name] for name in robot.joint_names]
         by_name = {joint.name: joint for joint in prepared.joints}
-        self._ends = [
+        self.ends = [
             (links[by_name[name].parent], links[by_name[name].child], by_name[name].kind)
             for name in robot.joint_names
         ]
         self.stiffness, self.damping = robot.column("stiffness"), robot.column("damping")
         self.limits = robot.column("effort_limit")
         motors = np.array([joint.motor for joint in robot.joints], dtype=bool)
-        self._forced = motors | (settings.drive == "force")
-        self.led: dict[int, int] = {}
-        self._coupled: list[list[int]] = []
+        self.forced = motors | (settings.drive == "force")
         index = robot.joint_names.index
-        for pair in robot.gripper.couplings:
-            if self.own:
-                follower, leader = joints[pair.follower], joints[pair.leader]
-                call("simSetJointDependency_D", follower, leader, c_double(0.0), c_double(1.0))
-                self._coupled.append([index(pair.follower), index(pair.leader)])
-            else:
-                self.led[index(pair.follower)] = index(pair.leader)
+        hand = [(index(pair.follower), index(pair.leader)) for pair in robot.gripper.couplings]
+        self.led: dict[int, int] = {} if self.own else dict(hand)
+        self._coupled = [[*pair] for pair in hand] if self.own else []
+        for pair in (*robot.gripper.couplings, *robot.couplings) if self.own else ():
+            law = c_double(pair.offset - self.offset(pair, pair.ratio)), c_double(pair.ratio)
+            call("simSetJointDependency_D", joints[pair.follower], joints[pair.leader], *law)
         for k, (handle, joint) in enumerate(zip(self.handles, robot.joints, strict=True)):
-            set_int(handle, "dynCtrlMode", MODES["force" if self._forced[k] else settings.drive])
+            set_int(handle, "dynCtrlMode", MODES["force" if self.forced[k] else settings.drive])
             most = joint.effort_limit * (2 if k in self.led else 1)  # it bears the leader's too
             call(
-                "simSetJointTargetForce_D", handle, c_double(0.0 if self._forced[k] else most), True
+                "simSetJointTargetForce_D", handle, c_double(0.0 if self.forced[k] else most), True
             )
             if self.own:
                 self._set_passive(handle, joint)
@@ -98,8 +99,7 @@ class Drives:
         self._tell_position = tell.simSetJointTargetPosition_D
         self._value = c_double()
         self._last = np.zeros(len(self.handles))
-        start = robot.column("initial_position")
-        self.command(start, 0 * start, 0 * start)
+        self.command(self._start, 0 * self._start, 0 * self._start)
 
     def _set_passive(self, handle: int, joint: Joint) -> None:
         """What MuJoCo gives a joint of its own."""
@@ -121,21 +121,21 @@ class Drives:
     def act(self) -> None:
         """Before a step: tell the joints what they are asked for."""
         position, velocity, effort = self.commanded
-        if self._forced.any():
+        if self.forced.any():
             q, v = self.state()
             damping = np.where(self.damping, self.damping, 0.0)
             asked = self.stiffness * (position - q) + damping * velocity + effort
             after = damping * (2 * v - self._last)
             self._last = v
             forces = np.clip(asked - after, -self.limits, self.limits) + after
-            for k in np.flatnonzero(self._forced).tolist():
+            for k in np.flatnonzero(self.forced).tolist():
                 self._tell_force(self.handles[k], c_double(forces[k]), True)
         if self.settings.drive == "force":
             return
         step = self.settings.timestep
         places = [self.position(k) for k in range(len(self.handles))]
         for k, handle in enumerate(self.handles):
-            if self._forced[k]:
+            if self.forced[k]:
                 continue
             leader = self.led.get(k)
             goal, speed = position[k], velocity[k]
@@ -148,18 +148,15 @@ class Drives:
                 rate = speed + gain * (goal - step * speed - places[k])
                 self._tell_velocity(handle, c_double(rate))
 
-    def forced(self, k: int) -> bool:
-        """Whether a joint is told its force."""
-        return bool(self._forced[k])
+    def offset(self, pair: Coupling, ratio: float) -> float:
+        """Of a pair at the start [rad or m], from where MuJoCo counts the one that it is told."""
+        start = dict(zip(self._names, self._start.tolist(), strict=True))
+        return float(start[pair.follower] - ratio * start[pair.leader])
 
     def leads(self, pair: Coupling) -> bool:
         """Whether the drive of a finger is led by the other one."""
         names = self._names
         return self.led.get(names.index(pair.follower)) == names.index(pair.leader)
-
-    def child(self, k: int) -> Part:
-        """The link that a joint moves."""
-        return self._ends[k][1]
 
     def position(self, k: int) -> float:
         """Of a joint, by its number [rad or m]."""
@@ -177,7 +174,7 @@ class Drives:
         if self.own:
             call("simGetJointVelocity_D", self.handles[k], byref(self._value))
             return self._value.value
-        parent, child, kind = self._ends[k]
+        parent, child, kind = self.ends[k]
         axis = get_pose(self.handles[k]).rotation()[:, 2]
         (v, w), (u, r) = child.velocity(), parent.velocity()
         if kind == "revolute":

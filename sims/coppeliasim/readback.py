@@ -164,7 +164,7 @@ class ReadBack(readback.ReadBack):
         call("simGetJointInterval_D", handle, byref(cyclic), interval)
         call("simGetJointTargetForce_D", handle, byref(force))
         found = {
-            "axis": self._motion(handle, drives.child(k)),
+            "axis": self._motion(handle, drives.ends[k][1]),
             "limits": [interval[0], interval[0] + interval[1]],
             "initial_position": drives.position(k),
             "effort_limit": abs(force.value),  # its sign is the speed's
@@ -177,7 +177,7 @@ class ReadBack(readback.ReadBack):
             found["stiffness"] = get_float(handle, "mujoco.springStiffness")
             if get_float(handle, "mujoco.springStiffness"):
                 found["rest"] = get_float(handle, "mujoco.springRef")
-        if drives.forced(k):
+        if drives.forced[k]:
             found["stiffness"] += drives.stiffness[k]
             found["effort_limit"] = drives.limits[k]
         return found
@@ -194,7 +194,8 @@ class ReadBack(readback.ReadBack):
         handle = self.joints[pair.follower]
         call("simGetJointDependency_D", handle, byref(leader), byref(offset), byref(ratio))
         if leader.value == self.joints[pair.leader]:
-            return np.array([ratio.value, offset.value])
+            start = self.drives.offset(pair, ratio.value)
+            return np.array([ratio.value, offset.value + start])
         return np.array([1.0, 0.0]) if self.drives.leads(pair) else np.zeros(2)
 
     def collide(self, first: Part, second: Part) -> Any:
