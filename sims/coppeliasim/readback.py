@@ -41,8 +41,11 @@ from .library import (
 )
 from .world import CAPSULE, CUBOID, CYLINDER, REVOLUTE, SPHEROID, Part
 
-BOX_CORNERS = 8
-"""A component of a shape of several that has so many corners is a box."""
+
+def is_box(corners: FloatArray) -> bool:
+    """Whether a part is one: eight corners, (n, 3), equally far from their middle."""
+    far = np.linalg.norm(corners - corners.mean(axis=0), axis=1)
+    return len(corners) == 8 and bool(np.ptp(far) < 1e-6)
 
 
 class _Component(ctypes.Structure):
@@ -92,8 +95,7 @@ class ReadBack(readback.ReadBack):
         kind, size = self._sizes(part)
         if get_bool(part.handle, "compound"):
             for corners in self._components(part):
-                inside = placed(corners, frame)
-                yield "boxes" if len(corners) == BOX_CORNERS else "meshes", reach(inside)
+                yield "boxes" if is_box(corners) else "meshes", reach(placed(corners, frame))
         elif kind == CUBOID:
             yield a_box(size, frame)
         elif kind == SPHEROID:
@@ -150,8 +152,7 @@ class ReadBack(readback.ReadBack):
         }
 
     def _damping(self, part: Part) -> dict[str, Any]:
-        mujoco = self.engine == "mujoco"
-        return {} if mujoco else {"damping": self.surfaces.damping(part.handle)}
+        return {} if self.engine == "mujoco" else {"damping": self.surfaces.damping(part.handle)}
 
     def _borne(self, part: Part) -> float:
         """Share of gravity that does not act on a link."""

@@ -9,11 +9,14 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pytest_simbench.sims.coppeliasim import library
 from pytest_simbench.sims.coppeliasim.adapter import CoppeliaSim
+from pytest_simbench.sims.coppeliasim.readback import is_box
 
 from pytest_simbench.client.environments import missing
 from pytest_simbench.client.errors import EngineFailed, WorkerExited
@@ -68,6 +71,13 @@ def test_a_library_that_is_none(root: Path, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(ctypes, "CDLL", lambda path: object())
     with pytest.raises(UnavailableError, match=r"has no simGet.*: .* older than 4.10; install"):
         library.library()
+
+
+def test_which_part_is_a_box() -> None:
+    corners = np.array(list(product((-1.0, 1.0), repeat=3))) * (1.0, 2.0, 3.0)
+    assert is_box(corners + 5.0)
+    assert not is_box(corners[:7])
+    assert not is_box(np.where(corners[:, 2:] > 0, 0.5 * corners, corners))  # the part of a bowl
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
