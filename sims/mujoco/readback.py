@@ -203,9 +203,13 @@ class ReadBack(readback.ReadBack):
         model = self.model
         if self.overridden:
             return one_value(model.opt.o_friction[:2])
-        pairs = np.isin(model.pair_geom1, geoms) | np.isin(model.pair_geom2, geoms)
-        own = model.pair_friction[pairs, :2].ravel()
-        return one_value(np.concatenate([model.geom_friction[geoms, 0], own]))
+        own = [
+            friction
+            for pair in range(model.npair)
+            if {model.pair_geom1[pair], model.pair_geom2[pair]} & set(geoms)
+            for friction in model.pair_friction[pair, :2]
+        ]
+        return one_value([*model.geom_friction[geoms, 0], *own])
 
     def _restitution(self, geoms: list[int]) -> Any:
         """Speed after a bounce over that before it, of the contacts' springs and dampers.
@@ -223,18 +227,18 @@ class ReadBack(readback.ReadBack):
     def _can_move(self, body: int) -> bool:
         """Whether the body has six degrees of freedom and nothing holds it."""
         model = self.model
-        holding = [mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT]
-        held = np.isin(model.eq_type, holding) & self.active
+        welds = model.eq_type == mujoco.mjtEq.mjEQ_WELD
+        held = (welds | (model.eq_type == mujoco.mjtEq.mjEQ_CONNECT)) & self.active
         ends = {*model.eq_obj1id[held], *model.eq_obj2id[held]}
         return bool(model.body_dofnum[body] == 6 and body not in ends)
 
     def collide(self, first: Part, second: Part) -> Any:
-        model, (a, b) = self.model, np.ix_(first.geoms, second.geoms)
-        if not (a.size and b.size):
+        model, a, b = self.model, first.geoms, second.geoms
+        if not (a and b):
             return ()
-        low, high = sorted(int(model.geom_bodyid[geoms.flat[0]]) for geoms in (a, b))
-        kinds = model.geom_contype[a] & model.geom_conaffinity[b]
-        kinds |= model.geom_conaffinity[a] & model.geom_contype[b]
+        low, high = sorted(int(model.geom_bodyid[geoms[0]]) for geoms in (a, b))
+        types, affinities = model.geom_contype, model.geom_conaffinity
+        kinds = types[a, None] & affinities[b] | affinities[a, None] & types[b]
         excluded = (low << 16) + high in model.exclude_signature
         return kinds * (not excluded and not self.off & {"CONTACT", "CONSTRAINT"})
 

@@ -119,7 +119,8 @@ class Lame(Hosted):
 
 
 class Toy(Hosted):
-    """Steps of 2 ms, each of which sleeps and burns a processor for a given time [s].
+    """Steps of 2 ms, each of which sleeps and burns a processor for a given time [s]; each look at
+    its state sleeps, or burns if `burns_looking`.
 
     Attributes:
         slept, burnt: seconds so far in `step`, as it measured itself.
@@ -136,6 +137,7 @@ class Toy(Hosted):
         self.sleep, self.burn, self.look = sleep, burn, look
         self.wall = self.burnt = 0.0
         self.looked = self.pictures = 0
+        self.burns_looking = False
         self.commands: list[FloatArray] = []
         self.bodies, self.joints = np.zeros((1, 13)), np.zeros((2, 0))
 
@@ -157,8 +159,11 @@ class Toy(Hosted):
 
     def body_state(self) -> FloatArray:
         self.looked += 1
-        if self.look:
+        if self.look and not self.burns_looking:
             time.sleep(self.look)
+        began = time.process_time()
+        while self.burns_looking and time.process_time() - began < self.look:
+            pass
         return self.bodies
 
     def joint_state(self) -> FloatArray:

@@ -109,11 +109,21 @@ def _step_with_a_slow_control() -> tuple[float, Clocks, float, dict[str, float]]
         return 0.0
 
     control.workload = slow
-    toy = Toy(burn=0.001)
+    toy = Toy(burn=0.001, look=0.001)
+    toy.burns_looking = True
     stepper = stepping(toy)
     began = time.process_time()
-    stepper.wait(0.4, None)
+    stepper.wait(0.4, 0.004)  # every other step is sampled
     return toy.burnt, stepper.clocks, time.process_time() - began, stepper.control.to_wire()
+
+
+def test_who_waits_for_a_processor_while_sampling_did_not_wait_in_a_step() -> None:
+    toy = Toy(look=0.002)
+    stepper = stepping(toy)
+    stepper._clock = lambda: (time.perf_counter(), 0.002 * toy.looked)  # type: ignore[assignment]
+    stepper.wait(0.4, 0.0)
+    assert toy.looked == 200
+    assert stepper.clocks.waited < 0.04
 
 
 def test_an_engine_s_other_threads_are_cpu_time() -> None:
