@@ -20,9 +20,9 @@ from pytest_simbench.description.robot_files import content_of
 from pytest_simbench.motion.adapting import with_tool
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError, Unreachable
-from pytest_simbench.motion.kinematics import inverse_kinematics
+from pytest_simbench.motion.kinematics import inverse_kinematics, straight_line
 from pytest_simbench.motion.model import RobotModel
-from pytest_simbench.scene import FloatArray, Pose, Robot, Scene
+from pytest_simbench.scene import FloatArray, Pose, Robot, Scene, Vector3
 
 CLEARANCE = 0.005
 """Least space between an open finger and a cube of the study's size [m]; it goes with the scale."""
@@ -109,8 +109,8 @@ def _opening(robot: Robot, gap: float, above: float) -> float | None:
 
 
 RESTARTS, FURTHER_RESTARTS = 10, 40
-"""Of the search for joint positions: for those nearest to home, and for others where these touch
-something. An arm of six joints has up to eight for a pose, the UR5 many more by whole turns."""
+"""Of the search for joint positions: for those nearest to home, and for others where these will not
+do. An arm of six joints has up to eight for a pose, the UR5 many more by whole turns."""
 
 
 class Choice(NamedTuple):
@@ -128,11 +128,12 @@ def choose(
     arm: FloatArray,
     rng: np.random.Generator,
     ignored: Sequence[str] = (),
+    way: Vector3 | None = None,
 ) -> Choice:
     """The pose that is free and needs the least joint travel.
 
-    The arm takes the joint positions nearest to home. Where those touch something for all poses, it
-    looks for others.
+    The arm takes the joint positions nearest to home. Where those touch something for all poses, or
+    lead nowhere from above, it looks for others.
 
     Args:
         tools: equivalent poses of the tool in the world.
@@ -140,6 +141,7 @@ def choose(
         home: arm joints where the search starts, (arm,) [rad].
         arm: present arm joints, (arm,) [rad].
         ignored: bodies that may be touched.
+        way: on which the tool must be able to go on from above, straight [m].
 
     Raises:
         PlanningError: none is free, and why the last one is not.
@@ -149,7 +151,7 @@ def choose(
         found = []
         for tool in tools:
             try:
-                found.append(_free(scene, tool, approach, home, rng, ignored, restarts))
+                found.append(_free(scene, tool, approach, home, rng, ignored, way, restarts))
             except PlanningError as error:
                 reason = error
         if found:
@@ -164,18 +166,30 @@ def _free(
     home: FloatArray,
     rng: np.random.Generator,
     ignored: Sequence[str],
+    way: Vector3 | None,
     restarts: int,
 ) -> Choice:
     """One of them; raises `PlanningError` where it is out of reach, or touches something."""
 
-    def wanted(arm: FloatArray) -> bool:
-        return restarts == RESTARTS or scene.collision(arm, ignored=ignored) is None
-
     over = tool.translated(z=approach)
+
+    def check(above: FloatArray) -> None:
+        at = inverse_kinematics(scene.model, tool, above)
+        for arm, margin in ((at, False), (above, True)):
+            touching = scene.collision(arm, ignored=ignored, margin=margin)
+            if touching is not None:
+                raise PlanningError(f"in collision: {' and '.join(touching)}")
+        if way is not None:
+            straight_line(scene.model, above, over.translated(*way))
+
+    def wanted(above: FloatArray) -> bool:
+        try:
+            if restarts != RESTARTS:
+                check(above)
+        except PlanningError:
+            return False
+        return True
+
     above = inverse_kinematics(scene.model, over, home, rng, restarts, wanted)
-    at = inverse_kinematics(scene.model, tool, above)
-    for arm, margin in ((at, False), (above, True)):
-        touching = scene.collision(arm, ignored=ignored, margin=margin)
-        if touching is not None:
-            raise PlanningError(f"in collision: {' and '.join(touching)}")
+    check(above)
     return Choice(tool, above)

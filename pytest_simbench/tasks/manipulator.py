@@ -15,7 +15,7 @@ from pytest_simbench.motion.grips import grips, turns
 from pytest_simbench.motion.kinematics import top_down_grasps
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.throw import Throw
-from pytest_simbench.scene import Body, Box, FloatArray, Pose, Robot, Scene
+from pytest_simbench.scene import Body, Box, FloatArray, Pose, Robot, Scene, Vector3
 from pytest_simbench.tasks.arm import Arm, LostBody
 from pytest_simbench.tasks.base import CUBE_SIZE
 
@@ -35,8 +35,11 @@ class Manipulator(Arm):
         """`APPROACH`, scaled [m]."""
         return APPROACH * self.scale
 
-    def pick(self, name: str) -> None:
+    def pick(self, name: str, way: Vector3 | None = None) -> None:
         """Grasp a body from above and lift it by `approach`.
+
+        Args:
+            way: on which it is then to be carried straight [m]; the arm comes as can do so.
 
         Raises:
             Ungraspable: the hand cannot hold it as it lies; nothing has moved.
@@ -44,19 +47,20 @@ class Manipulator(Arm):
             LostBody: it is not in the hand after lifting.
         """
         seen = self.world.pose(name)
-        grasp = self.reach_for(self.world.scene.body(name).moved_to(seen), (name,))
+        grasp = self.reach_for(self.world.scene.body(name).moved_to(seen), (name,), way)
         self.close_hand(around=name, seen=seen)
         self.move_straight(
             grasp.translated(z=self.approach), speed=self.speeds.carry, ignored=(name,)
         )
         self.check_held()
 
-    def reach_for(self, body: Body, ignored: tuple[str, ...]) -> Pose:
+    def reach_for(self, body: Body, ignored: tuple[str, ...], way: Vector3 | None = None) -> Pose:
         """Bring the open hand from above to where it grasps a body, or a part of something that is
         described as one; the pose of the tool there.
 
         Args:
             ignored: what may be touched: bodies, and links beside the arm.
+            way: as of `pick`.
 
         Raises:
             Ungraspable: the hand cannot hold it as it lies; nothing has moved.
@@ -64,7 +68,7 @@ class Manipulator(Arm):
         """
         with self.world.stopwatch.measuring("plan"):
             widths = {grip.tool: grip.width for grip in grips(self.model.robot, body, self.scale)}
-        down, above = self._plan_choice([self._aside(tool) for tool in widths], ignored=ignored)
+        down, above = self._plan_choice([self._aside(tool) for tool in widths], ignored, way)
         self.go_to(above, speed=self.speeds.free)
         self.move_straight(down, speed=self.speeds.contact, ignored=ignored)
         grasp = self._aside(down, back=True)
@@ -177,11 +181,13 @@ class Manipulator(Arm):
             return f"could not {what}: {error}"
         return None
 
-    def _plan_choice(self, tools: list[Pose], ignored: tuple[str, ...] = ()) -> Choice:
+    def _plan_choice(
+        self, tools: list[Pose], ignored: tuple[str, ...] = (), way: Vector3 | None = None
+    ) -> Choice:
         """The tool pose among equivalent ones to go to, and the arm joints `APPROACH` above it."""
         with self._planning():
             return choose(
-                self.planning, tools, self.approach, self.home, self.arm, self.rng, ignored
+                self.planning, tools, self.approach, self.home, self.arm, self.rng, ignored, way
             )
 
 

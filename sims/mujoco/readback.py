@@ -203,13 +203,9 @@ class ReadBack(readback.ReadBack):
         model = self.model
         if self.overridden:
             return one_value(model.opt.o_friction[:2])
-        own = [
-            friction
-            for pair in range(model.npair)
-            if {model.pair_geom1[pair], model.pair_geom2[pair]} & set(geoms)
-            for friction in model.pair_friction[pair, :2]
-        ]
-        return one_value([*model.geom_friction[geoms, 0], *own])
+        ends = zip(model.pair_geom1, model.pair_geom2, strict=True)
+        own = [k for k, pair in enumerate(ends) if set(pair) & set(geoms)]
+        return one_value([*model.geom_friction[geoms, 0], *model.pair_friction[own, :2].flat])
 
     def _restitution(self, geoms: list[int]) -> Any:
         """Speed after a bounce over that before it, of the contacts' springs and dampers.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import _thread
 import os
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -32,6 +30,7 @@ from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from tests.client.failing import STALL, Silent, failure, faulty, run
 from tests.conftest import workers
 from tests.tiny import Falling
+from tests.worker.test_control import busy_machine
 
 DEADLINE = 5.0
 """Of a repetition [s]."""
@@ -263,29 +262,14 @@ def test_signals_reach_their_handler_when_the_block_ends() -> None:
     assert reached
 
 
-@contextmanager
-def core_shared_with(others: int, pid: int) -> Iterator[None]:
-    """A process's main thread has one core, which `others` processes use without rest.
-
-    Each is in a session of its own: Linux shares a core out among sessions (`man 7 sched`).
-    """
-    cores = os.sched_getaffinity(pid)
-    os.sched_setaffinity(pid, {min(cores)})
-    command = ["taskset", "-c", str(min(cores)), sys.executable, "-c", "while True: pass"]
-    hogs = [subprocess.Popen(command, start_new_session=True) for _ in range(others)]
-    try:
-        yield
-    finally:
-        for hog in hogs:
-            hog.kill()
-            hog.wait()
-
-
 class Crowded(Falling):
     """Falls for ever, on a core that is shared with four others once the world is there."""
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        with core_shared_with(4, world.process.pid), world.phase("fall"):
+        pid = world.process.pid
+        core = min(os.sched_getaffinity(pid))
+        os.sched_setaffinity(pid, {core})
+        with busy_machine(4, "taskset", "-c", str(core)), world.phase("fall"):
             world.wait(1e6)
         return Outcome()
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.motion.registry import known_robot
 from pytest_simbench.scene import STANDARD_GRAVITY
-from pytest_simbench.tasks import Carrying, Jitter, Slipping
+from pytest_simbench.tasks import Carrying, Jitter, Slipping, carrying
 from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.carrying import ACCELERATION, FRICTION, Shape
 from tests.conftest import performed
@@ -63,7 +64,8 @@ def test_all_shapes_are_as_wide_and_reach_the_ground(shape: Shape) -> None:
     up = (0.0, 0.0, 1.0)
     reach = body.reach_placed(np.array([up, tuple(-np.array(up))]))
     assert reach[1] == pytest.approx(0.0, abs=1e-9)
-    assert Carrying(shape).problem() is None
+    for robot in (None, *map(known_robot, ("ur5", "ur10", "xarm7"))):
+        assert Carrying(shape, robot=robot).problem() is None
 
 
 @pytest.mark.parametrize("task", [TASK, Slipping(still=1.0)], ids=lambda task: task.name)
@@ -75,3 +77,11 @@ def test_on_an_engine(case: Case, task: Carrying) -> None:
 def test_who_holds_what_is_too_heavy_is_told_no_more() -> None:
     outcome, _ = carried(task=Slipping(still=1.0))
     assert outcome.metrics == {"held": 1.0}
+
+
+def test_an_arm_that_cannot_get_there_lets_nothing_slip(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(carrying, "WAY", 5.0)
+    for task, metrics in ((Carrying(still=1.0), {"held": 0.0}), (Slipping(still=1.0), {})):
+        outcome, _ = carried(task=task)
+        assert outcome.metrics == metrics
+        assert outcome.reasons[0].startswith("unreachable: straight line")

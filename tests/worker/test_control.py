@@ -17,12 +17,11 @@ from pytest_simbench.worker.control import MOST_AT_ONCE, SHARE, Clock, Control, 
 
 
 @contextmanager
-def busy_machine() -> Iterator[None]:
-    """Two processes a core that never rest, each in a session of its own: Linux shares the cores
-    out among sessions (`man 7 sched`, autogroups), and a worker has one."""
-    command = [sys.executable, "-c", "while True: pass"]
-    cores = os.cpu_count() or 1
-    hogs = [subprocess.Popen(command, start_new_session=True) for _ in range(2 * cores)]
+def busy_machine(others: int = 2 * (os.cpu_count() or 1), *before: str) -> Iterator[None]:
+    """Processes that never rest, each in a session of its own: Linux shares the cores out among
+    sessions (`man 7 sched`, autogroups), and a worker has one."""
+    command = [*before, sys.executable, "-c", "while True: pass"]
+    hogs = [subprocess.Popen(command, start_new_session=True) for _ in range(others)]
     try:
         yield
     finally:
