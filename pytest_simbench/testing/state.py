@@ -1,4 +1,5 @@
-"""Checks of what an adapter claims: save and restore, determinism, pictures, window."""
+"""Checks of what an adapter claims: save and restore, determinism, pictures, window; and that one
+process can serve many worlds."""
 
 from __future__ import annotations
 
@@ -6,9 +7,11 @@ import os
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 
 from pytest_simbench.client.motion import Motion
+from pytest_simbench.client.world import World
 from pytest_simbench.laws.hands import close_command
 from pytest_simbench.scene import Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import Capability
@@ -128,6 +131,28 @@ def reused_process_agrees(subject: Subject) -> None:
     with subject.world(scenes.tower()) as world:
         world.wait(0.1)
     require_same("two worlds in one process", swung(subject), first)
+
+
+WARM, WORLDS, LEFT = 2, 4, 4.0
+"""Worlds that fill an engine's caches, those after them, and memory that each of these may leave
+behind [MB]. Most engines leave 0 to 1, Genesis 9; one whose server was held left 28."""
+
+
+@check()
+def worlds_leave_no_memory(subject: Subject) -> None:
+    """A process that serves one world after another does not grow by more than 4 MB each."""
+    scene, used = busy_scene(subject.arm), []
+    subject.can_build(scene)
+    process = subject.launch()  # without what other checks left, which would be used first
+    try:
+        for _ in range(WARM + WORLDS):
+            subject.construct(process)
+            World(process, scene).wait(0.02)
+            used.append(psutil.Process(process.pid).memory_info().rss / 1e6)
+    finally:
+        process.kill()
+    left = (used[-1] - used[WARM - 1]) / WORLDS
+    require(left <= LEFT, f"each world leaves {left:.3g} MB behind, at most {LEFT:g} are right")
 
 
 @check(Capability.WINDOW, any_robot)

@@ -51,6 +51,7 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.Noisy, "restore_in_the_grip"),
     (wrong.Noisy, "fresh_processes_agree"),
     (wrong.Noisy, "reused_process_agrees"),
+    (wrong.Hoarder, "worlds_leave_no_memory"),
     (wrong.Blank, "picture_shows_something"),
 ]
 

@@ -184,6 +184,16 @@ class Noisy(MuJoCo):
         super().step()
 
 
+class Hoarder(MuJoCo):
+    """Each of its worlds leaves 5 MB behind."""
+
+    kept: ClassVar[list[Any]] = []
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        self.kept.append(np.ones(625_000))
+
+
 class Blank(MuJoCo):
     """Its pictures are of one colour, which is no grey, and another one in each scene."""
 
