@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -113,8 +114,8 @@ class ReadBack(readback.ReadBack):
             yield a_box(size, Pose())
         else:
             for k, solid in enumerate(made.parts[: part.count]):
-                reached = self.session.reach(f"{path}/{usd.shape_name(k)}", pose, solid.pose)
-                yield kind_of(solid), reached
+                name, size = f"{path}/{usd.shape_name(k)}", math.hypot(*solid.extents)
+                yield kind_of(solid), self.session.reach(name, pose, solid.pose, 2 * size)
 
     def asked(self, part: Part) -> list[FloatArray] | None:
         """Of a body: an error of 0.05 mm would order thin walls otherwise each time."""

@@ -12,6 +12,7 @@ from pytest_simbench.sims.ovphysx.adapter import OvPhysX
 
 from pytest_simbench.client.environments import missing
 from pytest_simbench.scene import Trajectory
+from pytest_simbench.tasks import Jitter, Nesting
 from pytest_simbench.testing import Subject, scenes
 
 ABSENT = missing(OvPhysX.info)
@@ -34,6 +35,12 @@ def test_the_first_command_is_obeyed_like_any_other() -> None:
             ends.append(world.joints[0])
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-5)
     np.testing.assert_allclose(ends[0], goal, atol=5e-3)
+
+
+def test_bowls_that_lie_in_each_other_are_no_larger_than_they_are() -> None:
+    """Parity looks when the world is loaded."""
+    with Subject(OvPhysX).world(Nesting(2).scene(1, Jitter())) as world:
+        assert len(world.bodies) == 2
 
 
 def test_threads_change_nothing() -> None:
