@@ -82,6 +82,7 @@ def test_who_holds_what_is_too_heavy_is_told_no_more() -> None:
 def test_an_arm_that_cannot_get_there_lets_nothing_slip(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(carrying, "WAY", 5.0)
     for task, metrics in ((Carrying(still=1.0), {"held": 0.0}), (Slipping(still=1.0), {})):
+        assert "cannot carry the cube: unreachable: straight line" in (task.problem() or "")
         outcome, _ = carried(task=task)
         assert outcome.metrics == metrics
         assert outcome.reasons[0].startswith("unreachable: straight line")
