@@ -135,7 +135,7 @@ def test_a_reaper_that_was_stopped_ends_with_its_run() -> None:
 @pytest.mark.parametrize("killed", [False, True])
 def test_a_run_leaves_no_process_and_no_temporary_file(tmp_path: Path, killed: bool) -> None:
     """Whatever an engine leaves there: of a run that ends well, and of one that is killed."""
-    script = SCRIPT if killed else SCRIPT.replace("1e6", "0.1")
+    script = SCRIPT if killed else SCRIPT.replace("1e6", "100.0")  # a second or two
     adapter, told = "tests.client.faulty:LeavesFiles", tmp_path / "ids"
     program = subprocess.Popen([sys.executable, "-c", script, str(tmp_path), adapter])
     while not (told.exists() and told.read_text()) and program.poll() is None:
