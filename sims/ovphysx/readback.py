@@ -115,7 +115,7 @@ class ReadBack(readback.ReadBack):
         else:
             for k, solid in enumerate(made.parts[: part.count]):
                 name, size = f"{path}/{usd.shape_name(k)}", math.hypot(*solid.extents)
-                yield kind_of(solid), self.session.reach(name, pose, solid.pose, 2 * size)
+                yield kind_of(solid), self.session.reach(name, pose, solid.pose, size)
 
     def asked(self, part: Part) -> list[FloatArray] | None:
         """Of a body: an error of 0.05 mm would order thin walls otherwise each time."""
