@@ -135,7 +135,7 @@ def reused_process_agrees(subject: Subject) -> None:
 
 WARM, WORLDS, LEFT = 2, 4, 4.0
 """Worlds that fill an engine's caches, those after them, and memory that each of these may leave
-behind [MB]. Engines leave 0 to 1, one 13; one whose server was held by an adapter left 28."""
+behind [MB]. Engines leave 0 to 2, one 13; one whose server was held by an adapter left 28."""
 
 
 @check()
