@@ -221,7 +221,7 @@ class ClosedLoop:
             WorkerError: as `WorkerProcess.request`.
         """
         self._points.after(answer)
-        return self._send(np.concatenate([self._points.position, self._points.effort]).tobytes())
+        return self._send(self._points.position.tobytes() + self._points.effort.tobytes())
 
     def end(self) -> None:
         """No more answers."""

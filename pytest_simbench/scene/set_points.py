@@ -275,6 +275,8 @@ class Sight:
 
 def written(
     time: float, joints: FloatArray, told: Sequence[FloatArray], bodies: FloatArray
-) -> FloatArray:
-    """What `Sight.read` reads, as one row of numbers."""
-    return np.concatenate([[time], joints.ravel(), *told, bodies.ravel()])
+) -> bytes:
+    """What `Sight.read` reads, numbers of float64 one after the other."""
+    return b"".join(
+        [np.float64(time).tobytes(), *(part.tobytes() for part in (joints, *told, bodies))]
+    )

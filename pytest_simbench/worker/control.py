@@ -71,18 +71,17 @@ class Clock:
         Read again when another process was let in between the two: on a busy machine that single
         turn is as long as hundreds of runs of the control.
         """
-        if self._file < 0:
-            return time.perf_counter(), 0.0
-        before = self._waited()
+        before = self.waited()
         while True:
             now = time.perf_counter()
-            waited = self._waited()
+            waited = self.waited()
             if waited == before:
-                return now, waited / 1e9
+                return now, waited
             before = waited
 
-    def _waited(self) -> int:
-        return int(os.pread(self._file, 96, 0).split()[1])
+    def waited(self) -> float:
+        """Seconds waited until now."""
+        return int(os.pread(self._file, 96, 0).split()[1]) / 1e9 if self._file >= 0 else 0.0
 
 
 class Control:

@@ -9,6 +9,7 @@ import json
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import repeat
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -68,7 +69,8 @@ class Loop:
         before, (position, effort) = self._target[0], answer
         way = position - before
         speed = way / self._period
-        self._queue.extend([(at, speed, effort) for at in before + self._shares * way])
+        rows = before + self._shares * way
+        self._queue.extend(zip(rows, repeat(speed), repeat(effort), strict=False))
         self._target = position, speed, effort
         return True
 
@@ -91,7 +93,7 @@ def outside(
     def answer(
         time: float, joints: FloatArray, told: Row, bodies: FloatArray
     ) -> tuple[FloatArray, FloatArray] | None:
-        state = written(time, joints, told, bodies).tobytes()
+        state = written(time, joints, told, bodies)
         came = exchange(b"".join([state, *(look() for look in looks)]))
         if came is None:
             return None
@@ -126,7 +128,7 @@ def inside(scene: Scene, told: Row, period: float, policy: Mapping[str, Any]) ->
     def answer(
         time: float, joints: FloatArray, told: Row, bodies: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        state = written(time, joints, told, bodies).tobytes()  # as outside: it cannot be written to
+        state = written(time, joints, told, bodies)  # as outside: it cannot be written to
         try:
             points.after(made(sight.read(np.frombuffer(state))))
         except PolicyError:

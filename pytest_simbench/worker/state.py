@@ -57,7 +57,7 @@ class States:
             StateError: no number, or not a finite one.
         """
         time = self.simulator.time
-        if isinstance(time, bool) or not isinstance(time, int | float | np.floating):
+        if isinstance(time, bool) or not isinstance(time, (float, int, np.floating)):
             raise StateError(f"{self._name}: the time must be a float, not {shown(time)}")
         if not math.isfinite(time):
             raise StateError(f"{self._name}: the time must be finite, not {time}")
@@ -82,7 +82,7 @@ class States:
     def joints(self) -> FloatArray:
         """Positions and velocities, (2, n_joints); errors as `bodies`."""
         count = len(self.scene.robot.joints) if self.scene.robot is not None else 0
-        return _checked(f"{self._name}: joint_state()", self.simulator.joint_state(), (2, count))
+        return _checked(self.simulator, "joint_state", (2, count))
 
     def bodies(self) -> FloatArray:
         """Rows as `Simulator.body_state`, (n_free, 13).
@@ -90,8 +90,7 @@ class States:
         Raises:
             StateError: a wrong type, shape or kind of number.
         """
-        shape = (len(self.scene.free_bodies), 13)
-        return _checked(f"{self._name}: body_state()", self.simulator.body_state(), shape)
+        return _checked(self.simulator, "body_state", (len(self.scene.free_bodies), 13))
 
     @property
     def _name(self) -> str:
@@ -200,14 +199,18 @@ def check_following(simulator: Simulator, scene: Scene, joints: FloatArray, goal
     )
 
 
-def _checked(title: str, values: Any, shape: tuple[int, ...]) -> FloatArray:
-    """A copy of the array, which may be the engine's own, if it is one of float64 of this shape."""
-    came = f"a {type(values).__name__}"
-    if isinstance(values, np.ndarray):
-        if values.dtype == np.float64 and values.shape == shape:
-            return values.copy()
+def _checked(simulator: Simulator, method: str, shape: tuple[int, ...]) -> FloatArray:
+    """A copy of what a method gives, which may be the engine's own array, if it is one of float64
+    of this shape."""
+    values: Any = getattr(simulator, method)()
+    if not isinstance(values, np.ndarray):
+        came = f"a {type(values).__name__}"
+    elif values.dtype == np.float64 and values.shape == shape:
+        return values.copy()
+    else:
         came = f"{values.dtype} {values.shape}"
-    raise StateError(f"{title} must be an array of float64 {shape}, not {came}")
+    name = f"{simulator.info.name}: {method}()"
+    raise StateError(f"{name} must be an array of float64 {shape}, not {came}")
 
 
 def _check_places(title: str, names: Sequence[str], asked: FloatArray, came: FloatArray) -> None:

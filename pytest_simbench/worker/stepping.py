@@ -195,8 +195,8 @@ class Stepper:
     ) -> dict[str, Any]:
         """Advance by `steps`; a log sample every `log_period` [s] (0: every step; None: no log).
 
-        A loop is asked for more rows after each of its periods, and may end it all. A step that is
-        only sampled does not stop the clocks, which takes longer: its sample's time is taken out.
+        A loop is asked for more rows after each of its periods, and may end it all. Looking and
+        asking do not stop the clocks, which takes longer: what they took is taken out.
 
         Returns:
             The log: time (n,), joints (n, 2, n_joints), bodies (n, n_free, 13); {} where there is
@@ -226,7 +226,7 @@ class Stepper:
         cpu_began = family.cpu()
         began, waited = clock()
         beat = resumed = began
-        aside = aside_cpu = 0.0
+        aside = aside_waited = aside_cpu = 0.0
         for k in range(1, steps + 1):
             if rows is not None:
                 command(*next(rows))
@@ -234,32 +234,12 @@ class Stepper:
                 act()
             step()
             logs = log_every and k % log_every == 0
-            films = film_every and (totals.steps + k) % film_every == 0
             asks = ask_every and k % ask_every == 0
-            if (
-                not (films or asks)
-                and k % look_every
-                and k % check_every
-                and k < steps
-                and k != due
-            ):
-                if logs:
-                    paused, cpu_paused = time.perf_counter(), time.thread_time()
-                    now = states.time_after(k, from_time)
-                    samples.append((now, states.joints(), states.bodies()))
-                    aside_cpu += time.thread_time() - cpu_paused
-                    aside += time.perf_counter() - paused
-                continue
-            stopped, waited_now = clock()
-            totals.wall += stopped - resumed - aside
-            totals.waited += max(0.0, waited_now - waited - (aside - aside_cpu))
-            if k == steps:
-                family.meet()
-            totals.cpu += family.cpu() - cpu_began - aside_cpu
-            aside = aside_cpu = 0.0
-            now = states.time_after(k, from_time)
             checks = k % check_every == 0 or k in (steps, due)
-            if logs or checks or asks:
+            films = film_every and (totals.steps + k) % film_every == 0
+            if logs or asks or checks:
+                paused, waits, cpu = time.perf_counter(), clock.waited(), time.thread_time()
+                now = states.time_after(k, from_time)
                 joints, bodies = states.joints(), states.bodies()
                 if logs:
                     samples.append((now, joints, bodies))
@@ -270,10 +250,21 @@ class Stepper:
                     due = watch.due - from_start
                 if loop is not None and asks and not loop.ask(now, joints, bodies):
                     steps = k
-                    break
+                aside_cpu += time.thread_time() - cpu
+                aside_waited += clock.waited() - waits
+                aside += time.perf_counter() - paused
+            if not (checks or films or k % look_every == 0 or k == steps):
+                continue
+            stopped, waited_now = clock()
+            totals.wall += stopped - resumed - aside
+            totals.waited += waited_now - waited - aside_waited
+            if k == steps:
+                family.meet()
+            totals.cpu += family.cpu() - cpu_began - aside_cpu
+            aside = aside_waited = aside_cpu = 0.0
             if stopped - beat > HEARTBEAT_PERIOD:
                 beat = stopped
-                self.heartbeat(now)
+                self.heartbeat(states.time())
             if films and self.film is not None:
                 self.film[1]()
             if simulator.gui and stopped > self._next_picture:
@@ -286,11 +277,10 @@ class Stepper:
                     time.sleep(ahead)
             # The CPU time of an engine with threads, the wall time of a busy machine: the less.
             keep_up(min(totals.wall, totals.cpu))
+            if k == steps:
+                break
             cpu_began = family.cpu()
             resumed, waited = clock()
-        if loop is not None:
-            family.meet()
-            totals.cpu += family.cpu() - cpu_began
         totals.steps += steps
         totals.simulated += steps * timestep
         columns = map(np.array, zip(*samples, strict=True))
@@ -298,7 +288,8 @@ class Stepper:
 
     def _check_finite(self, time: float, joints: FloatArray, bodies: FloatArray) -> None:
         for what, state in (("joints", joints), ("bodies", bodies)):
-            if not np.isfinite(state).all():
+            square = float(np.vdot(state, state))  # one quick call where all is well
+            if not math.isfinite(square) and not np.isfinite(state).all():
                 raise DivergedError(
                     f"the state of the {what} is not finite at t = {time:.3f} s with "
                     f"{self.simulator.settings}; a smaller timestep may help"

@@ -176,7 +176,7 @@ def test_what_is_seen() -> None:
         rng.normal(size=(1, 13)),
     )
     sight = Sight(SCENE, SERVO, Pose.at(1, 2, 3))
-    state = written(0.5, joints, told, bodies)
+    state = np.frombuffer(written(0.5, joints, told, bodies))
     assert len(state) == sight.numbers
     seen = sight.read(state)
     assert seen.time == 0.5

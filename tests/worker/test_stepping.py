@@ -24,6 +24,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.simulator import DivergedError, NotSupportedError
 from pytest_simbench.worker import control
+from pytest_simbench.worker.loop import Loop
 from pytest_simbench.worker.stepping import CHECK_PERIOD, Acting, Clocks, Stepper, prescribed
 from tests.worker.hosted import Toy
 
@@ -117,13 +118,42 @@ def _step_with_a_slow_control() -> tuple[float, Clocks, float, dict[str, float]]
     return toy.burnt, stepper.clocks, time.process_time() - began, stepper.control.to_wire()
 
 
-def test_who_waits_for_a_processor_while_sampling_did_not_wait_in_a_step() -> None:
+def test_who_waits_for_a_processor_while_looking_or_asking_did_not_wait_in_a_step() -> None:
     toy = Toy(look=0.002)
     stepper = stepping(toy)
-    stepper._clock = lambda: (time.perf_counter(), 0.002 * toy.looked)  # type: ignore[assignment]
+
+    class Waiting(control.Clock):
+        def waited(self) -> float:
+            return 0.002 * toy.looked
+
+    stepper._clock = Waiting()
     stepper.wait(0.4, 0.0)
-    assert toy.looked == 200
-    assert stepper.clocks.waited < 0.04
+    stepper.close_loop(asked(lambda: True), None)
+    assert toy.looked == 225  # once before, 20 times to ask, 4 to check between
+    assert stepper.clocks.waited == pytest.approx(0.0)
+
+
+def asked(answer: Callable[[], bool]) -> Loop:
+    """Asks 20 times, each 20 steps, whether it goes on."""
+    row, none = np.zeros(1), np.zeros(1)
+    return Loop(20, 20, 0, (row, none, none), 0.04, lambda *_: (row, none) if answer() else None)
+
+
+def test_a_question_is_no_time_of_the_steps_also_where_the_policy_ends_it() -> None:
+    toy, answers = Toy(burn=0.001), iter([True, True, False])
+    stepper = stepping(toy)
+
+    def answer() -> bool:
+        began = time.thread_time()
+        while time.thread_time() - began < 0.05:
+            pass
+        time.sleep(0.05)
+        return next(answers)
+
+    stepper.close_loop(asked(answer), None)
+    assert stepper.clocks.steps == 40
+    assert toy.wall <= stepper.clocks.wall < toy.wall + 0.03
+    assert toy.burnt <= stepper.clocks.cpu < toy.burnt + 0.02
 
 
 def test_an_engine_s_other_threads_are_cpu_time() -> None:
