@@ -192,7 +192,7 @@ class Manipulator(Arm):
 
 
 def cannot_handle(
-    robot: Robot, fixed: Sequence[Box], places: Sequence[Pose], scale: float = 1.0
+    robot: Robot, fixed: Sequence[Box], places: Sequence[Pose], scale: float
 ) -> str | None:
     """Why a robot cannot grasp and place cubes from above at some places, in one sentence, or None.
 

@@ -11,6 +11,7 @@ import pytest
 mujoco = pytest.importorskip("mujoco")
 
 from pytest_simbench.sims.mujoco.adapter import MuJoCo  # noqa: E402
+from pytest_simbench.sims.mujoco.own_file import OwnFile  # noqa: E402
 from pytest_simbench.sims.mujoco.reading import Reading  # noqa: E402
 
 from pytest_simbench.parity.compare import compare  # noqa: E402
@@ -248,7 +249,15 @@ def test_parts_whose_gravity_is_compensated_unlike_have_the_mean(tmp_path: Path)
     reading = read(tmp_path, SMALL.replace('name="tool"', 'name="tool" gravcomp="1"'))
     (held,), root = reading.scene.body("tool").wrenches, reading.model.body("tool").id
     assert held.force == pytest.approx((0, 0, 9.81 * reading.model.body_mass[root]))
-    assert "body gravcomp (of parts)" in {line.quantity for line in reading.account}
+    told = {line.quantity: line.where for line in reading.account}
+    assert told["body gravcomp (of parts)"] == "tool"
+
+
+def test_another_time_step_than_the_file_s_is_told(tmp_path: Path) -> None:
+    scene = read(tmp_path, SMALL).scene
+    for factor, told in ((1, 0), (2, 1)):
+        found = OwnFile(scene, factor * scene.file_timestep).deviations()
+        assert sum("the file asks for steps" in d.reason for d in found) == told
 
 
 def test_the_file_itself_is_borne_once(tmp_path: Path) -> None:
