@@ -43,6 +43,11 @@ def test_a_file_changes_a_profile(tmp_path: Path) -> None:
     assert case.chosen_on[:-1]  # and on what the base was chosen
 
 
+def test_a_file_may_change_nothing(tmp_path: Path) -> None:
+    found = read_profile(written(tmp_path, 'simulator = "mujoco"\nbase = "tuned"\n'))
+    assert (found.changes, found.chosen_on) == ({}, ())
+
+
 def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
     first = read_profile(written(tmp_path, TEXT)).label
     assert first == read_profile(written(tmp_path, f"# the same\n{TEXT}")).label

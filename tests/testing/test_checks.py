@@ -11,7 +11,7 @@ import pytest
 from pytest_simbench.client.errors import WorkerError, WorldParityError
 from pytest_simbench.motion.registry import find
 from pytest_simbench.simulator import Simulator
-from pytest_simbench.testing import CHECKS, ConformanceFailure, ConformanceTest, Subject
+from pytest_simbench.testing import CHECKS, ConformanceFailure, ConformanceTest, Subject, drives
 
 from . import cheats, tampered, wrong
 
@@ -54,6 +54,19 @@ FAULTS: list[tuple[type[Simulator], str]] = [
     (wrong.Hoarder, "worlds_leave_no_memory"),
     (wrong.Blank, "picture_shows_something"),
 ]
+
+
+def test_a_drive_meets_least_where_the_others_give_way() -> None:
+    """At the wrist's end that hardly matters, at the arm's foot it does."""
+    robot = find("panda")
+    start = robot.column("initial_position")
+    foot, end = (
+        drives._yielding_inertia(robot, start, k, armature=True)
+        / drives.own_inertia(robot, start, k, armature=True)
+        for k in (0, 6)
+    )
+    assert 0.5 < foot < 0.8
+    assert 0.99 < end <= 1.0
 
 
 def test_a_copy_of_the_scene_is_no_fault_by_itself() -> None:

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pytest_simbench.experiment.identity import file_stem_of
@@ -96,6 +97,14 @@ def test_settings_tell_apart_what_names_do_not(tmp_path: Path) -> None:
     page = replay_of(groups(tmp_path, kept))[0]
     assert '"label":"drake headless (tuned)"' in page
     assert '"label":"drake gui (tuned)"' in page
+
+
+def test_what_is_drawn_to_scale_is_of_size_1(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Any] = []
+    monkeypatch.setattr("trimesh.viewer.notebook.scene_to_html", drawn.append)
+    render._Meshes().viewer()
+    sizes = [solid.extents for solid in drawn[0].geometry.values()]
+    assert np.array(sizes) == pytest.approx(np.ones((3, 3)), abs=0.02)
 
 
 def test_missing_trimesh_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
