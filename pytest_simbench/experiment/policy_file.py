@@ -19,8 +19,8 @@ ONE, SEVERAL = "policy", "policies"
 """What a file calls them."""
 
 
-def read_policies(path: Path, name: str = "") -> list[Any]:
-    """Those of a file: `policy`, else all of `policies`; or the one of a name.
+def read_policies(path: Path, name: str) -> list[Any]:
+    """Those of a file: `policy`, else all of `policies`; or the one of a name, if it is not empty.
 
     A policy without a name of its own has that in `policies`, or the file's.
 

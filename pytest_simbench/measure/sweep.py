@@ -48,8 +48,8 @@ class Point:
 
     step: float
     error: float
-    tolerance: float | None = None
-    cost: float | None = None
+    tolerance: float | None
+    cost: float | None
     rounding: float = 0.0
     message: str = ""
 

@@ -119,15 +119,13 @@ def _arrived(error: FloatArray, joints: int) -> bool:
     return bool(shift < TOLERANCE and turn < TURN_TOLERANCE)
 
 
-def straight_line(
-    model: RobotModel, start: FloatArray, target: Pose, spacing: float = 0.01
-) -> FloatArray:
-    """Joint positions along the straight tool path from `start` to `target`, (n, arm).
+def straight_line(model: RobotModel, start: FloatArray, target: Pose) -> FloatArray:
+    """Joint positions along the straight tool path from `start` to `target`, each at most 1 cm and
+    0.1 rad from the last, (n, arm).
 
     Args:
         start: arm joints at the beginning.
         target: tool pose at the end; the orientation turns evenly on the way.
-        spacing: of the tool positions [m].
 
     Raises:
         Unreachable: the line leaves the workspace or jumps to another arm configuration.
@@ -136,7 +134,7 @@ def straight_line(
     last = pin.SE3(target.matrix())
     turn = pin.log3(first.rotation.T @ last.rotation)
     length = float(np.linalg.norm(last.translation - first.translation))
-    steps = max(2, int(np.ceil(max(length / spacing, float(np.linalg.norm(turn)) / 0.1))))
+    steps = max(2, int(np.ceil(max(length / 0.01, float(np.linalg.norm(turn)) / 0.1))))
     line = [
         pin.SE3(
             first.rotation @ pin.exp3(share * turn),

@@ -86,8 +86,8 @@ class MotionPlanner:
         target: Pose,
         fingers: float,
         *,
-        ignored: Iterable[str] = (),
-        speed: float = 1.0,
+        ignored: Iterable[str],
+        speed: float,
     ) -> Trajectory:
         """The tool on a straight line to a pose; `ignored` bodies may be touched.
 

@@ -28,7 +28,7 @@ class Timed(NamedTuple):
 
 
 def straight_move(
-    start: FloatArray, goal: FloatArray, limits: MotionLimits, *, speed: float = 1.0
+    start: FloatArray, goal: FloatArray, limits: MotionLimits, *, speed: float
 ) -> Timed:
     """From rest to rest on the straight line in joint space; its last row is the goal.
 

@@ -39,7 +39,7 @@ class Comparison:
     """
 
     baseline: RunContents
-    limits: Sequence[Limit] = ()
+    limits: Sequence[Limit]
     beside: Beside | None = None
     typed: bool = False
     found: Compared | None = field(default=None, init=False)
@@ -77,7 +77,7 @@ class Comparison:
 
 
 def prepare(
-    config: pytest.Config, saved: list[dict[str, Any]], simulators: Sequence[str] = ()
+    config: pytest.Config, saved: list[dict[str, Any]], simulators: Sequence[str]
 ) -> Comparison | None:
     """The comparison that the options ask for; None when nothing is to be compared with.
 

@@ -112,7 +112,7 @@ class Perturber:
     """One task in one simulator, to be perturbed; what `perturb(task)` gives."""
 
     episodes: Episodes
-    strict: bool = False
+    strict: bool
 
     @property
     def task(self) -> Task:

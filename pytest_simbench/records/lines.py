@@ -258,8 +258,8 @@ class _Line:
     """A line of a file: the JSON objects in it, and what is wrong with it if anything is."""
 
     where: str
-    found: tuple[dict[str, Any], ...] = ()
-    problem: str = ""
+    found: tuple[dict[str, Any], ...]
+    problem: str
 
 
 def _lines(folder: Path, name: str) -> Iterator[_Line]:

@@ -157,7 +157,7 @@ def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> s
     return f"no badge: {failed}" if failed else ""
 
 
-def write_tables(folder: Path, to: Path | None = None) -> tuple[list[Table], list[str]]:
+def write_tables(folder: Path, to: Path | None) -> tuple[list[Table], list[str]]:
     """The tables of what a run folder holds on repeatability, and one sentence for each thing that
     is wrong; with a folder for it also as a file of Markdown."""
     from pytest_simbench.report.model.repeatability import found_in

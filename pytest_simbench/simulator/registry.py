@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, distributions
 from typing import Any
@@ -38,9 +38,9 @@ class Registry:
         unreadable: sentences, one for each distribution whose metadata cannot be read.
     """
 
-    entries: Mapping[str, EntryPoint] = field(default_factory=dict)
-    broken: Mapping[str, str] = field(default_factory=dict)
-    unreadable: tuple[str, ...] = ()
+    entries: Mapping[str, EntryPoint]
+    broken: Mapping[str, str]
+    unreadable: tuple[str, ...]
 
 
 @cache

@@ -188,8 +188,8 @@ class Searched:
     setting: str
     part: int | None
     over: Linear | tuple[Any, ...]
-    whole: bool = False
-    when: When = ()
+    whole: bool
+    when: When
 
     @property
     def name(self) -> str:

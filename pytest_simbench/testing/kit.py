@@ -44,8 +44,8 @@ class Check:
 
     name: str
     law: Law
-    needs: Capability | None = None
-    robot: Unfit | None = None
+    needs: Capability | None
+    robot: Unfit | None
 
     @property
     def doc(self) -> str:

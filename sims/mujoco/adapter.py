@@ -102,15 +102,16 @@ class MuJoCo(Simulator):
             data.ctrl[:] = initial
         free = [model.joint(f"{body.name}/free") for body in scene.free_bodies]
         self._body_q = np.array([j.qposadr[0] + np.arange(7) for j in free], int).reshape(-1, 7)
-        self._body_v = np.array([j.dofadr[0] + np.arange(6) for j in free], int).reshape(-1, 6)
-        self._body_rows = np.hstack([self._body_q, model.nq + self._body_v])
+        self._body_v = np.array([j.dofadr[0] + np.arange(3) for j in free], int).reshape(-1, 3)
+        dofs = model.nq + self._body_v
+        self._body_rows = np.hstack([self._body_q, dofs, dofs + 3])
         self._body_ids = np.array([model.body(b.name).id for b in scene.free_bodies], dtype=int)
         for at, body in zip(self._body_v, scene.free_bodies, strict=True):
-            data.qvel[at[:3]] = body.linear_velocity
-            data.qvel[at[3:]] = body.pose.rotation().T @ body.angular_velocity  # in its own frame
+            data.qvel[at] = body.linear_velocity
+            data.qvel[at + 3] = body.pose.rotation().T @ body.angular_velocity  # in its own frame
             if body.damping.any():
-                model.dof_damping[at[:3]] = body.linear_damping * body.mass
-                model.dof_damping[at[3:]] = body.angular_damping * body.inertia()
+                model.dof_damping[at] = body.linear_damping * body.mass
+                model.dof_damping[at + 3] = body.angular_damping * body.inertia()
         self._led = np.flatnonzero([body.prescribed for body in scene.free_bodies])
         mujoco.mj_forward(model, data)
         if len(self._led):
@@ -146,9 +147,10 @@ class MuJoCo(Simulator):
         self.data.xfrc_applied[self._body_ids] = wrenches
 
     def lead(self, before: FloatArray, after: FloatArray) -> None:
-        spins = np.einsum("nij,ni->nj", rotations(before[:, 3:7]), before[:, 10:])
         self.data.qpos[self._body_q[self._led]] = before[:, :7]
-        self.data.qvel[self._body_v[self._led]] = np.hstack([before[:, 7:10], spins])  # own frame
+        self.data.qvel[self._body_v[self._led]] = before[:, 7:10]
+        spins = np.einsum("nij,ni->nj", rotations(before[:, 3:7]), before[:, 10:])
+        self.data.qvel[self._body_v[self._led] + 3] = spins  # in its own frame
 
     def step(self) -> None:
         mujoco.mj_step(self.model, self.data)

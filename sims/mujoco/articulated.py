@@ -59,7 +59,7 @@ class OnJoint:
     above: OnJoint | None
     name: str
     told: str
-    whole: bool = True
+    whole: bool
 
 
 def on_joints(reading: Reading) -> list[OnJoint]:

@@ -55,7 +55,7 @@ class Claims:
     sentence: str
     table: Table
     troubles: Sequence[Trouble]
-    more: int = 0
+    more: int
 
 
 @dataclass(frozen=True)

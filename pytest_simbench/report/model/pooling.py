@@ -32,9 +32,9 @@ class Spread:
     min: float
     mean: float
     max: float
-    std: float = 0.0
-    low: float | None = None
-    high: float | None = None
+    std: float
+    low: float | None
+    high: float | None
     peak: float | None = None
 
 

@@ -77,7 +77,7 @@ class StripLine:
     mean: float | None
     low: float | None
     high: float | None
-    left_out: str = ""
+    left_out: str
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,9 @@ class Strip:
     doc: str
     lines: Sequence[StripLine]
     ticks: Sequence[tuple[float, str]]
-    reference: float | None = None
-    study: bool = False
-    logarithmic: bool = False
+    reference: float | None
+    study: bool
+    logarithmic: bool
 
     @property
     def lost(self) -> bool:

@@ -32,7 +32,7 @@ def claim_lines(found: Claims, width: int) -> str:
     return "\n\n".join(filter(None, parts))
 
 
-def sweep_lines(found: Sequence[Swept], width: int, whole: bool = False) -> list[str]:
+def sweep_lines(found: Sequence[Swept], width: int, whole: bool) -> list[str]:
     """Laws over time steps: the table and the first failures; `whole`: every law as well."""
     told = sweep.section(found)
     if told is None:

@@ -29,7 +29,7 @@ class _Repetition:
 
     number: int
     began: float
-    node: str = ""
+    node: str
     phase: str = ""
     done: int = 0
     total: int = 0

@@ -68,7 +68,7 @@ def render_section(found: Section, width: int, *, titled: bool = True) -> str:
     return "\n\n".join(filter(None, parts))
 
 
-def render_brief(summaries: Sequence[TaskSummary], width: int = 80) -> str:
+def render_brief(summaries: Sequence[TaskSummary], width: int) -> str:
     """The answer, a line for each row, and warnings, as plain lines of at most `width` columns;
     empty without a task. Everything else is in the report, and in the terminal with `-v`."""
     if not summaries:
