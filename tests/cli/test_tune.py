@@ -15,9 +15,18 @@ import pytest
 
 from pytest_simbench.cli.main import main
 from pytest_simbench.cli.tune import _judge
-from pytest_simbench.cli.tune_told import Result, profile_of
+from pytest_simbench.cli.tune_told import (
+    Result,
+    front_of,
+    profile_of,
+    progress,
+    together,
+    verdict_of,
+)
 from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.simulator.profile_file import read_profile
+from pytest_simbench.tuning.search import front
+from tests.approval import assert_approved
 from tests.cli.command import said
 from tests.tuning.made_up import target, trials
 
@@ -72,6 +81,27 @@ def test_how_many_seeds_are_judged_and_on_which_it_was_chosen(tmp_path: Path) ->
     path.write_text(profile_of(Result(looks, [today], today, "", halves)))
     told = [Seen.seeds("stacking", 7, 9), Seen.seeds("falling", 300_001, 300_002)]
     assert [*read_profile(path).chosen_on] == told
+
+
+def test_all_that_is_said_of_a_search(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One that ends with a cheaper point; the same one not judged; and one that keeps today's."""
+    looks, _ = trials(
+        tmp_path, lambda s, k: None if s["timestep"] > 0.01 else 1.0 - (s["timestep"] > 0.004) / k,
+        target(4, 60),
+    )  # fmt: skip
+    today = looks.today()
+    done, tell = [today], progress(looks)
+    for number, step in enumerate((0.003, 0.015, 0.001, 0.008), 1):
+        one = looks.choose(f"trial{number}", {"timestep": step}, done)
+        done.append(one)
+        tell(one, front(done, looks))
+    better = Result(looks, done, done[1], "it is cheaper", _judge(looks, today, done[1], 500.0))
+    unknown = replace(better, halves=())
+    kept = replace(unknown, found=today)
+    lines = [capsys.readouterr().out, *together((better, unknown, kept))]
+    for of in (better, unknown, kept):
+        lines += [*front_of(of), *verdict_of(of)]
+    assert_approved("tune", "\n".join(lines))
 
 
 TEST = """
