@@ -162,7 +162,7 @@ def test_a_whole_report(
         badge(report.records, outcome.passed),
         FLAT.sub(lambda m: " ".join(m[0].split()), shown),
     ]  # fmt: skip
-    assert_approved(run.__name__, "\n".join(texts).replace(str(tmp_path), "RUN"))
+    assert_approved(f"report-{run.__name__}", "\n".join(texts).replace(str(tmp_path), "RUN"))
 
 
 def test_the_table_of_simulators() -> None:
