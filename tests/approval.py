@@ -24,3 +24,15 @@ def assert_approved(name: str, text: str) -> None:
     if os.environ.get("SIMBENCH_APPROVE"):
         file.write_text(found)
     assert found == file.read_text()
+
+
+def assert_approved_line(name: str, key: str, text: str) -> None:
+    """The same of one line of a file, `key: text`, of several that tests share."""
+    file = APPROVED / f"{name}.txt"
+    lines = file.read_text().splitlines() if file.exists() else []
+    if os.environ.get("SIMBENCH_APPROVE"):
+        lines = sorted(
+            [*(line for line in lines if not line.startswith(f"{key}: ")), f"{key}: {text}"]
+        )
+        file.write_text("\n".join([*lines, ""]))
+    assert f"{key}: {text}" in lines

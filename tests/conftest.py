@@ -28,6 +28,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.tasks import Task
+from tests.approval import assert_approved_line
 
 with contextlib.suppress(ImportError):
     # dask imports it. It takes from Python's own finder what lists packages, and adds a finder of
@@ -87,6 +88,9 @@ def performed(case: Case, task: Task, number: int = 1) -> Record:
     """The record of a repetition that goes well."""
     record, error = Repetition(Experiment(case, task), number).run()
     assert error is None, record.error
+    if type(task).__module__.startswith("pytest_simbench.tasks"):
+        told = " ".join(sorted([*record.metrics, *record.details]))
+        assert_approved_line("told", task.name, told)
     return record
 
 

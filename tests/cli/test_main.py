@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 import pytest_simbench
-from pytest_simbench.cli import environments
+from pytest_simbench.cli import environments, simulators
 from pytest_simbench.cli.main import COMMANDS, GROUPS
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.simulator.registry import adapter, registered
+from tests.approval import assert_approved
 from tests.cli.command import said
 from tests.motion.small_arm import URDF, small_arm
 
@@ -129,6 +130,15 @@ def test_what_cannot_be_is_one_sentence(
     assert status == 2
     assert told.count("\n") == 1
     assert fnmatchcase(told.splitlines()[-1], sentence)
+
+
+def test_all_that_is_said_of_simulators_that_are_not_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And their settings: what each means, what profiles have, and what is searched."""
+    monkeypatch.setenv("COLUMNS", "200")
+    lines = [*simulators._paragraphs((), lambda name: f"no {name}", {}, True)]
+    for name in registered():
+        lines += ["", *simulators._settings(name)]
+    assert_approved("simulators", "\n".join(lines))
 
 
 def test_the_list_is_a_table(capsys: pytest.CaptureFixture[str]) -> None:

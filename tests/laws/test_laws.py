@@ -22,6 +22,7 @@ from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Jitter, Outcome
 from pytest_simbench.testing.subject import Subject
+from tests.approval import assert_approved_line
 
 from .faults import FAULTS
 
@@ -79,6 +80,7 @@ def test_a_law_is_kept_and_a_planted_fault_breaks_it(name: str) -> None:
     assert broken.metrics["ratio"] > BROKEN, broken.reading
     allowed = SHORT.get(name) or PUBLISHED[name, ELSEWHERE.get(name, "mujoco")]
     assert kept.reading.tolerance == pytest.approx(allowed, rel=0.01)
+    assert_approved_line("exact", name, f"{round(kept.reading.exact, 6) + 0.0:.4g} {law.unit}")
 
 
 def test_there_are_enough_and_each_phenomenon_has_one() -> None:

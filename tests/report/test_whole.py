@@ -14,6 +14,7 @@ import pytest
 
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.measure.limits import parse_limits
+from pytest_simbench.measure.watching import Step
 from pytest_simbench.records import repeatability
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import TaskDescription, Threshold
@@ -23,12 +24,12 @@ from pytest_simbench.records.notes import Notes, Wait
 from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.report.files import write_files, write_outcome, write_tables
 from pytest_simbench.report.markdown.github import badge
-from pytest_simbench.report.model.capabilities import columns
+from pytest_simbench.report.markdown.run import render_section as markdown
+from pytest_simbench.report.model import watched
 from pytest_simbench.report.model.outcome import RunOutcome
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.page.context import page
 from pytest_simbench.report.terminal import parts
-from pytest_simbench.report.terminal.grid import render
 from pytest_simbench.report.terminal.run import render_brief, render_run, render_section
 from tests.approval import assert_approved
 from tests.measure.test_history import release
@@ -65,7 +66,12 @@ def tasks(folder: RunFolder) -> RunOutcome:
         folder.claim(told)
     whole = Claim(now[0].test, "test_stacking", "mujoco", "headless", "tuned", "FAIL", advice="x")
     folder.claim(whole)
-    better = [replace(r, metrics={**r.metrics, "placed": 1.0}) for r in stacking_run() if r.ok]
+    better = [
+        replace(r, metrics={**r.metrics, "placed": 1.0}, robot={"name": "panda"})
+        for r in stacking_run()
+        if r.ok
+    ]
+    better += [replace(r, robot={"name": "ur5"}, test="test_of_an_arm") for r in better[:2]]
     limits = parse_limits("placed:5%,ram:10%", STACKING)
     return RunOutcome(False, ("runs/before", run_gate(better, now, limits, METRICS)), looks=2)
 
@@ -98,7 +104,7 @@ def scene(folder: RunFolder) -> RunOutcome:
         *(end("a", x, moved=1e-4, seed=k) for k, x in ((1, 0.0), (2, 0.2))),
         *(end(who, x, step=0.0005) for who, x in (("a", 0.0), ("b", 0.1))),
     ):
-        folder.append(one)
+        folder.append(replace(one, stepping={"cpu": 0.1, "simulated": 2.5, "wall": 0.1}))
     return RunOutcome(None)
 
 
@@ -165,5 +171,10 @@ def test_a_whole_report(
     assert_approved(f"report-{run.__name__}", "\n".join(texts).replace(str(tmp_path), "RUN"))
 
 
-def test_the_table_of_simulators() -> None:
-    assert_approved("simulators", render(columns(), 300))
+def test_a_watch() -> None:
+    steps = [
+        Step("mujoco", "3.3", "3.4", ("placed fell",), ("RAM rose", "it warns"), day="2026-11-01"),
+        Step("drake", "1.40", "1.41", (), (), day="2026-11-02"),
+    ]
+    told = watched.section(steps, ["mujoco 3.4 changed something."])
+    assert_approved("report-watch", f"{markdown(told)}\n\n{render_section(told, 100)}")
