@@ -28,7 +28,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.tasks import Task
-from tests.approval import assert_approved_line
+from tests.approval import assert_approved_line, watched
 
 with contextlib.suppress(ImportError):
     # dask imports it. It takes from Python's own finder what lists packages, and adds a finder of
@@ -90,7 +90,7 @@ def performed(case: Case, task: Task, number: int = 1) -> Record:
     assert error is None, record.error
     if type(task).__module__.startswith("pytest_simbench.tasks"):
         told = " ".join(sorted([*record.metrics, *record.details]))
-        assert_approved_line("told", task.name, told)
+        assert_approved_line("told", f"{task.name}: {told}")
     return record
 
 
@@ -167,6 +167,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 LEAN = "-p no:hypothesispytest"
 """Hypothesis' own plugin imports all of Hypothesis when it sums up: 0.6 CPU seconds a run. What
 perturbs asks Hypothesis itself."""
+
+
+@pytest.fixture(autouse=True)
+def messages(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever expects an error expects the approved message, in tests that need no engine and draw
+    nothing at random."""
+    drawn = getattr(request.node.obj, "is_hypothesis_test", False)
+    if not (drawn or request.node.get_closest_marker("engine")):
+        monkeypatch.setattr(pytest, "raises", watched(pytest.raises))
 
 
 @pytest.fixture

@@ -171,6 +171,7 @@ def test_one_simulator_is_told_whole(capsys: pytest.CaptureFixture[str]) -> None
 
 def test_robots_and_their_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out = said(capsys, "robots")[1]
+    assert_approved("robots", out)
     for line in (
         "panda: 7 arm joints, 2 fingers that open to 0.035 m, base at (0, 0, 0)",
         "so101: 5 arm joints, one jaw that opens to 1 rad, base at (0, 0, 0)",

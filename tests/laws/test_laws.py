@@ -80,7 +80,8 @@ def test_a_law_is_kept_and_a_planted_fault_breaks_it(name: str) -> None:
     assert broken.metrics["ratio"] > BROKEN, broken.reading
     allowed = SHORT.get(name) or PUBLISHED[name, ELSEWHERE.get(name, "mujoco")]
     assert kept.reading.tolerance == pytest.approx(allowed, rel=0.01)
-    assert_approved_line("exact", name, f"{round(kept.reading.exact, 6) + 0.0:.4g} {law.unit}")
+    exact = round(kept.reading.exact, 6) + 0.0
+    assert_approved_line("exact", f"{name}: {exact:.4g} {law.unit}")
 
 
 def test_there_are_enough_and_each_phenomenon_has_one() -> None:

@@ -90,6 +90,22 @@ def test_a_record_tells_which_policy_it_was() -> None:
     kept = [Held(1.0), Held(1.0)]  # each stands somewhere else in memory
     assert digest(Held(kept[:1])) == digest(Held(kept[1:]))
 
+    def before() -> Any:
+        class Steady:
+            def act(self, seen: Observation) -> float:
+                return 1.0
+
+        return Steady()
+
+    def after() -> Any:
+        class Steady:
+            def act(self, seen: Observation) -> float:
+                return 2.0
+
+        return Steady()
+
+    assert digest(before()) == digest(before()) != digest(after())
+
     def closed(gain: float) -> Callable[[Observation], float]:
         return lambda seen: gain
 
