@@ -28,7 +28,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.tasks import Task
-from tests.approval import assert_approved_line, watched
+from tests.approval import Running, assert_approved_line, watched
 
 with contextlib.suppress(ImportError):
     # dask imports it. It takes from Python's own finder what lists packages, and adds a finder of
@@ -174,8 +174,9 @@ def messages(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
     """Whoever expects an error expects the approved message, in tests that need no engine and draw
     nothing at random."""
     drawn = getattr(request.node.obj, "is_hypothesis_test", False)
-    if not (drawn or request.node.get_closest_marker("engine")):
-        monkeypatch.setattr(pytest, "raises", watched(pytest.raises))
+    held = not (drawn or request.node.get_closest_marker("engine"))
+    monkeypatch.setattr(Running, "test", request.node.nodeid if held else "")
+    monkeypatch.setattr(pytest, "raises", watched(pytest.raises))
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ import sys
 
 import pytest
 
-from pytest_simbench.cli.main import main
+from pytest_simbench.cli.main import BAD_INPUT, main
+from tests.approval import assert_approved_message
 
 
 def simbench(pytester: pytest.Pytester, *words: str) -> pytest.RunResult:
@@ -23,4 +24,7 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str
         status = main(words)
     except SystemExit as error:
         status = int(error.code or 0)
-    return status, *capsys.readouterr()
+    out, err = capsys.readouterr()
+    if status == BAD_INPUT:
+        assert_approved_message(err)
+    return status, out, err
