@@ -13,8 +13,9 @@ from pytest_simbench.report.model.document import Column
 from pytest_simbench.report.model.summary import TaskSummary, summarise
 from pytest_simbench.report.terminal.grid import render
 from pytest_simbench.report.terminal.run import MOST_LINES, render_brief, render_run, render_task
+from tests.approval import assert_approved
 
-from .samples import METRICS, REFERENCES, failed, record, stacking_run, text, throwing_run
+from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run
 
 EIGHT = ("mujoco", "pybullet", "drake", "dart", "sapien", "ovphysx", "newton", "genesis")
 
@@ -39,89 +40,12 @@ def eight() -> list[TaskSummary]:
 
 def test_the_whole_result_of_a_task_at_100_columns() -> None:
     (stacking,) = summarise(stacking_run(), METRICS)
-    assert render_task(stacking, 100) == text(
-        """
-        stacking: 20 repetitions each, protocol fast
-        ============================================
-        placed: mujoco 99 % [79, 100] is ahead of pybullet 65 % [40, 78], by 33.3 points [16.7, 50].
-        at the end: mujoco 97 % [77, 99] is ahead of pybullet 77 % [46, 91], by 20 points [1.53, 38.5].
-        crashes: pybullet 3 of 20.
-
-        simulator                          crashed                 placed %            at the end %
-        -------------------------------------------------------------------------------------------
-        mujoco headless tuned    0 of 20 [0, 17] %  93 / 99 / 100 [79, 100]  87 / 97 / 100 [77, 99]
-        pybullet headless tuned  3 of 20 [3, 38] %     0 / 65 / 87 [40, 78]   0 / 77 / 100 [46, 91]
-
-                                                               x real      CPU  start  end
-        simulator                  CPU %               RAM MB    time  s/sim s      s    s
-        ----------------------------------------------------------------------------------
-        mujoco headless tuned    99 +- 3  150 +- 2 (peak 161)      20    0.048   0.80  9.8
-        pybullet headless tuned  99 +- 3  150 +- 2 (peak 161)      20    0.048   0.80  9.8
-
-        stacking, crashes
-        simulator                count  failure     phase   repetitions  message
-        ----------------------------------------------------------------------------------------------------
-        pybullet headless tuned      2  WorkerHung  settle  8, 9         no answer within 60 s; last line of
-                                                                         its log: died
-        pybullet headless tuned      1  WorkerDied  pick    3            the worker was killed by SIGSEGV;
-                                                                         last line of its log: died
-
-        stacking, further metrics: mean [95 % interval]
-                           placed  at the end               untouched
-        simulator        strict %    strict %  towers %   moved cubes    failed picks
-        -----------------------------------------------------------------------------
-        mujoco                 98          96        90             0            0.05
-        headless tuned  [78, 100]    [77, 99]  [71, 98]                [-0.078, 0.38]
-
-        pybullet               84          82        78          0.47           0.059
-        headless tuned   [51, 98]    [50, 97]  [47, 95]  [0.15, 0.81]  [-0.094, 0.45]
-
-        stacking, the row beats the column at (in brackets: differs from it)
-        simulator  mujoco  pybullet
-        --------------------------------------------------
-        mujoco             placed, at_end, untouched_moved
-        pybullet   -
-
-        stacking, where the time went: mean wall seconds and share
-                                                                                             total
-        simulator                  launch s      load s      plan s      step s     other s      s
-        ------------------------------------------------------------------------------------------
-        mujoco headless tuned    0.50 (5 %)  0.30 (3 %)  1.0 (10 %)  8.0 (80 %)  0.20 (2 %)   10.0
-        pybullet headless tuned  0.50 (5 %)  0.30 (3 %)  1.0 (10 %)  8.0 (80 %)  0.20 (2 %)   10.0
-        """  # noqa: E501
-    )
+    assert_approved("terminal-whole", render_task(stacking, 100))
 
 
 def test_the_short_result() -> None:
-    assert render_brief(summarise([*stacking_run(), *throwing_run()], METRICS), 80) == text(
-        """
-        2 simulators did stacking and throwing: 80 repetitions, 3 crashed (pybullet
-          3).
-        Outcome: stacking, placed and at the end: mujoco ahead (behind: pybullet);
-          throwing, moved: a difference needs at least 6 pairs that differ; so far 1.
-        Cost: CPU s per simulated s, stacking and throwing: not compared; RAM,
-          stacking and throwing: a difference needs at least 6 pairs that differ; so far
-          none.
-
-        stacking: 20 repetitions each, protocol fast
-                                           at the end      CPU  RAM  x real
-        simulator  crashed      placed %            %  s/sim s   MB    time
-        -------------------------------------------------------------------
-        mujoco     0 of 20  99 [79, 100]  97 [77, 99]    0.048  150      20
-        pybullet   3 of 20   65 [40, 78]  77 [46, 91]    0.048  150      20
-
-        throwing: 20 repetitions each, protocol fast
-                                             CPU  RAM  x real
-        simulator  crashed      moved %  s/sim s   MB    time
-        -----------------------------------------------------
-        mujoco     0 of 20  42 [33, 54]    0.048  150      20
-        pybullet   0 of 20  39 [27, 52]    0.048  150      20
-
-        CRASHED stacking, pybullet headless tuned: 2 x WorkerHung in settle: no answer
-          within 60 s
-        CRASHED stacking, pybullet headless tuned: 1 x WorkerDied in pick: the worker
-          was killed by SIGSEGV
-        """
+    assert_approved(
+        "terminal-short", render_brief(summarise([*stacking_run(), *throwing_run()], METRICS), 80)
     )
 
 
@@ -132,17 +56,8 @@ def test_names_that_leave_no_room_stand_above_their_numbers() -> None:
         for name in ("laboratory/bench/test_towers.py::test_tall", "test_towers.py::test_low")
         for k in range(1, 21)
     ]  # fmt: skip
-    assert render_brief(summarise(records, METRICS), 80).partition("\n\n")[2] == text(
-        """
-        stacking: 20 repetitions each, protocol fast
-                                   at the end      CPU  RAM  x real
-          crashed       placed %            %  s/sim s   MB    time
-          ---------------------------------------------------------
-        mujoco (laboratory/bench/test_towers.py::test_tall)
-          0 of 20  100 [80, 100]  90 [72, 92]    0.048  150      20
-        mujoco (test_towers.py::test_low)
-          0 of 20  100 [80, 100]  90 [72, 92]    0.048  150      20
-        """
+    assert_approved(
+        "terminal-long-names", render_brief(summarise(records, METRICS), 80).partition("\n\n")[2]
     )
 
 
@@ -236,17 +151,4 @@ def test_a_table_too_wide_is_cut_by_group_and_its_rows_named_again() -> None:
         Column("first one", ["1", "2"], "x"),
         Column("second", ["3", "4"], "y"),
     ]
-    assert render(columns, 14) == text(
-        """
-              first
-        name    one
-        -----------
-        a         1
-        b         2
-
-        name  second
-        ------------
-        a          3
-        b          4
-        """
-    )
+    assert_approved("terminal-cut", render(columns, 14))

@@ -13,8 +13,8 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.report.markdown.run import render_section as markdown
 from pytest_simbench.report.model.changes import columns, section
 from pytest_simbench.report.terminal.parts import render_changes
+from tests.approval import assert_approved
 from tests.report.samples import METRICS, STACKING, THROWING, failed, record, stacking_run
-from tests.report.samples import text as block
 
 
 def made(placed: float, errors: float, **changes: object) -> list[Record]:
@@ -49,19 +49,7 @@ def test_at_80_columns_it_is_one_table_in_which_tests_stand_above_their_metrics(
            for r in stacking_run()]  # fmt: skip
     report = run_gate(stacking_run(), now, parse_limits("placed:5%,ram:10%", STACKING), METRICS)
     told = render_changes(replace(report, others=(), broken=(), notes=()), 80, False)
-    assert told.partition("\n\nFAILED")[0] == block(
-        """
-          metric   baseline      now        change       p  verdict
-          ------------------------------------------------------------------------
-        test_stacking[mujoco-headless]
-          placed    98.67 %  68.67 %    -30 points  0.0004  FAILED, limit 5 points
-          ram        150 MB   150 MB             0       1  passed, limit 10 %
-        test_stacking[pybullet-headless]
-          placed    65.33 %  39.83 %  -25.5 points  0.0004  FAILED, limit 5 points
-          ram        150 MB   150 MB             0       1  passed, limit 10 %
-          crashed      15 %     15 %             0       1  passed, limit 0 points
-        """
-    )
+    assert_approved("terminal-changes", told.partition("\n\nFAILED")[0])
 
 
 def test_a_change_without_a_limit_is_called_worse_or_better_only_when_it_is_sure() -> None:
