@@ -19,6 +19,8 @@ from typing import Any
 
 APPROVED = Path(__file__).parent / "approved"
 
+HOW = "if it is meant, write it with SIMBENCH_APPROVE=1 (tests/approval.py)"
+
 LONG = re.compile(r"\d+\.\d{7,}(e-?\d+)?")
 """Numbers whose last digits another processor may round otherwise."""
 
@@ -51,7 +53,7 @@ def assert_approved(name: str, text: str) -> None:
     file = APPROVED / f"{name}.txt"
     if approving():
         file.write_text(found)
-    assert found == file.read_text()
+    assert found == file.read_text(), f"{file} holds another text; {HOW}"
 
 
 def assert_approved_line(name: str, line: str) -> None:
@@ -62,7 +64,7 @@ def assert_approved_line(name: str, line: str) -> None:
         kept = file.read_text().splitlines() if file.exists() else []
         file.write_text("\n".join([*sorted({*kept, line}), ""]))
         _lines.cache_clear()
-    assert line in _lines(name)
+    assert line in _lines(name), f"tests/approved/{name}.txt does not hold it: {line}; {HOW}"
 
 
 @cache

@@ -121,12 +121,12 @@ def run(
                 error.add_note(f"records are kept: folder={str(place.path)!r}, resume=True goes on")
                 raise
         contents = place.scan()
-        problems += [*place.flush(), *contents.problems, *contents.refused]
+        problems += [*place.flush(), *contents.problems]
         if not contents.records:
-            raise BadInput(f"nothing was simulated: {'; '.join(problems)}")
+            raise BadInput(f"nothing was simulated: {'; '.join(problems or contents.refused)}")
         looks = looks_at(place.path, resumed.records if resumed else (), contents.records)
         problems.append(write_outcome(place.path, RunOutcome(looks=looks)))
-        return Run(place.path, contents, problems)
+        return Run(place.path, contents, [*problems, *contents.refused])
 
 
 def _read(name: str, value: object, form: Callable[[str], Any]) -> Any:

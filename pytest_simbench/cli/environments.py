@@ -37,8 +37,8 @@ def uninstall(names: Sequence[str]) -> int:
     for name in names:
         if name not in there:
             raise BadInput(
-                f"there is no environment {name!r} in {default_folder()}; choose from "
-                f"{', '.join(there) or 'none is there'}"
+                f"there is no environment {name!r} in {default_folder()}; "
+                + (f"choose from {', '.join(there)}" if there else "none is there")
             )
     for name in dict.fromkeys(names):
         size = size_mb(there[name])

@@ -82,7 +82,7 @@ def test_help_loads_nothing_large() -> None:
         ("install nosuch", "simbench install: unknown simulator 'nosuch'; choose from *"),
         ("install mujoco", "simbench install: mujoco needs no environment of its own: *"),
         ("install", "simbench install: the following arguments are required: NAME; *"),
-        ("uninstall x", "simbench uninstall: there is no environment 'x' in *; choose from *"),
+        ("uninstall x", "simbench uninstall: there is no environment 'x' in *; none is there"),
         ("download nosuch", "*no data set 'nosuch'; choose from cube_tosses*"),
         ("merge", "simbench merge: the following arguments are required: RUN; *"),
         ("merge none", "simbench merge: none: cannot read records from *"),
@@ -204,7 +204,7 @@ def test_environments_come_and_go(capsys: pytest.CaptureFixture[str]) -> None:
         0, f"{name}: 0 MB, MuJoCo None\n0 MB in {environment.folder.parent}\n", ""
     )  # fmt: skip
     assert said(capsys, "uninstall", name) == (0, f"{name}: removed, 0 MB\n", "")
-    assert "choose from none is there" in said(capsys, "uninstall", name)[2]
+    assert "; none is there" in said(capsys, "uninstall", name)[2]
 
 
 @pytest.mark.parametrize("command", ["environments", "cluster head"])

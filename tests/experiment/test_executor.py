@@ -46,7 +46,7 @@ def held_for(slots: Slots, test: str, seconds: float) -> None:
 def test_the_unknown_come_first_then_the_longest_and_what_no_test_wants_last(
     slots: Slots,
 ) -> None:
-    slots._ended |= {NOW + key_of("long"): (100, 6000.0), NOW + key_of("short"): (100, 100.0)}
+    slots._ended |= {NOW + key_of("long"): (10, 600.0), NOW + key_of("short"): (100, 1000.0)}
     order: list[str] = []
 
     def wait(test: str) -> None:

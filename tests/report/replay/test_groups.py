@@ -19,6 +19,8 @@ from pytest_simbench.report.page.render import render as html
 from pytest_simbench.report.replay import render
 from pytest_simbench.report.replay.recorded import groups, links
 from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
+from pytest_simbench.scene import ConvexMesh, Pose
+from pytest_simbench.testing.scenes import wedge
 from tests.recordings.samples import trace
 from tests.report.samples import METRICS, record
 
@@ -99,11 +101,17 @@ def test_settings_tell_apart_what_names_do_not(tmp_path: Path) -> None:
     assert '"label":"drake gui (tuned)"' in page
 
 
-def test_what_is_drawn_to_scale_is_of_size_1(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_drawn_to_scale_is_of_size_1_and_a_mesh_as_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     drawn: list[Any] = []
     monkeypatch.setattr("trimesh.viewer.notebook.scene_to_html", drawn.append)
-    render._Meshes().viewer()
-    sizes = [solid.extents for solid in drawn[0].geometry.values()]
+    meshes = render._Meshes()
+    meshes.body(ConvexMesh("wedge", wedge(), Pose.at(1.0, 0.0, 0.0), 1.0))
+    meshes.viewer()
+    *solids, mesh = drawn[0].geometry.values()
+    assert mesh.bounds == pytest.approx(np.array([np.min(wedge(), 0), np.max(wedge(), 0)]))
+    sizes = [solid.extents for solid in solids]
     assert np.array(sizes) == pytest.approx(np.ones((3, 3)), abs=0.02)
 
 
