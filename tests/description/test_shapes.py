@@ -46,7 +46,7 @@ def stl_binary() -> bytes:
 
 
 def obj_text() -> bytes:
-    corners = "\n".join(f"v {x} {y} {z}" for x, y, z in TRIANGLE)
+    corners = "\n".join(f"v {x} {y} {z} 1.0" for x, y, z in TRIANGLE)
     return f"# t\n{corners}\nvn 0 0 1\nf 1 2 3\n".encode()
 
 

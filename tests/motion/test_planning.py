@@ -115,6 +115,17 @@ def test_a_held_cube_moves_with_the_hand(scene: Scene, planner: MotionPlanner) -
     assert planning.collision(low, margin=False) is None
 
 
+def test_both_positions_are_the_ends_of_what_is_checked_between_them(
+    planner: MotionPlanner,
+) -> None:
+    rows = planner._segment(READY, READY + 0.1)
+    assert len(rows) > 2
+    assert rows[[0, -1]] == pytest.approx(np.array([READY, READY + 0.1]))
+    assert np.diff(rows, axis=0) == pytest.approx(
+        np.full((len(rows) - 1, 7), 0.1 / (len(rows) - 1))
+    )
+
+
 def test_checks_are_close_together(planner: MotionPlanner) -> None:
     goal = READY + np.array([1.0, -0.3, 0.2, 0.3, -0.5, 0.2, 1.0])
     rows = planner.move_to(READY, goal, 0.035).position[:, :7]
