@@ -26,7 +26,8 @@ LONG = re.compile(r"\d+\.\d{7,}(e-?\d+)?")
 
 PASSING = (
     (re.compile(r"(\n--- last lines|; its last words:).*", re.DOTALL), ""),
-    (re.compile(r"(?<![\w.])/[\w./+-]*/((test_\w*|pytest-|popen-gw)\d+\b|pytest-of-\w+)?"), "DIR/"),
+    (re.compile(r"(?<![\w.])/[\w./+-]*/(test_\w*\d\b)?"), "DIR/"),
+    (re.compile(r"(?<=the folder )DIR/\S+(?= of the scene)"), "DIR/"),
     (re.compile(r"(?<=the releases of nosuch )\([^)]*\)"), "HOST"),  # those of this machine
     (re.compile(r"\b(127\.0\.0\.1|localhost):\d+"), "HOST"),
     (re.compile(r"\d{4}-\d\d-\d\d_[\d-]+-[0-9a-f]{8}|0x[0-9a-f]+|[0-9a-f]{24,}"), "#"),
