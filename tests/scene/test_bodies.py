@@ -32,6 +32,7 @@ from pytest_simbench.scene import (
 from pytest_simbench.scene.friction import RULES
 from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.testing import scenes
+from tests.approval import assert_approved_message
 
 SIGNS = list(product((-1.0, 1.0), repeat=3))
 
@@ -354,6 +355,7 @@ def test_the_bowl_s_frictions_are_exact_by_a_mean_and_not_by_the_smaller_one() -
         assert of_pairs(made) == pytest.approx([1.0, 1.0, 0.95], abs=1e-3)
     made, problem = combined(own, "minimum")
     assert "of cube0 and thing it is off by 0.05" in problem
+    assert_approved_message(problem)
     assert of_pairs(made) == pytest.approx([1.0, 1.0, 1.0])
 
 

@@ -15,6 +15,8 @@ mujoco = pytest.importorskip("mujoco")
 from pytest_simbench.sims.mujoco.adapter import MuJoCo  # noqa: E402
 from pytest_simbench.sims.mujoco.reading import Reading  # noqa: E402
 
+from pytest_simbench.description.robot_files import description_xml  # noqa: E402
+from pytest_simbench.description.shapes import mesh_points  # noqa: E402
 from pytest_simbench.description.urdf import PreparedRobot  # noqa: E402
 from pytest_simbench.experiment.case import Case  # noqa: E402
 from pytest_simbench.experiment.handle import SimulatorHandle  # noqa: E402
@@ -147,6 +149,17 @@ def test_limits_drives_and_the_rest_of_the_scene(kitchen: Path) -> None:
     assert (elbow.stiffness, elbow.damping, elbow.effort_limit) == (20.0, 2.0, 8.0)
     assert (elbow.spring, elbow.rest, scene.robot.joints[0].passive_damping) == (3.0, 0.0, 2.0)
     assert scene.robot.self_collide
+    hulls = {  # of a ball, a capsule and a cylinder
+        link.get("name"): np.ptp(mesh_points(mesh.get("filename", "")), axis=0)
+        for link in description_xml(scene.robot).iter("link")
+        for mesh in link.iter("mesh")
+    }
+    for link, size in (
+        ("drawer", [0.04] * 3),
+        ("arm", [0.02, 0.02, 0.12]),
+        ("hand", [0.06, 0.06, 0.2]),
+    ):
+        assert hulls[link] == pytest.approx(size, abs=1e-3)
     assert scene.apart == (("link/arm", "link/hand"),)  # parent and child
     assert [body.name for body in scene.bodies] == ["cabinet", "ball"]
 
