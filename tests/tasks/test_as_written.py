@@ -15,6 +15,7 @@ import pytest
 
 from pytest_simbench.laws import LAWS, Law
 from pytest_simbench.laws.base import held_out
+from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import (
     Carrying,
     CurvePushing,
@@ -35,7 +36,7 @@ from pytest_simbench.tasks.base import Jitter, Task
 from pytest_simbench.tasks.carrying import Shape
 from pytest_simbench.tasks.inserting import Section
 from pytest_simbench.tasks.towers import LeaningTowers
-from pytest_simbench.testing import scenes
+from pytest_simbench.testing import faults, scenes
 from tests.approval import assert_approved
 
 LONGEST = 24
@@ -136,6 +137,13 @@ def test_scenes_of_the_kit() -> None:
     robot = scenes.lifted(scenes.arm())
     made = (
         scenes.falling(), scenes.tower(), scenes.tumbling((0.1, 0.06, 0.04)), robot,
-        scenes.at_random(robot, np.random.default_rng(1)), scenes.wedge(),
+        scenes.at_random(robot, np.random.default_rng(1)), scenes.wedge(), faults.true_scene(),
+        *(scene for scene, _ in faults.mechanisms(Capability)),
     )  # fmt: skip
-    assert_approved("asked-kit", "\n".join(map(words, made)))
+    planted = faults.FAULTS.items(), *(f.items() for _, f in faults.mechanisms(Capability))
+    told = [
+        f"{name}: {fault.what}; {fault.quantity}; {fault.needs}; {fault.word}"
+        for found in planted
+        for name, fault in found
+    ]
+    assert_approved("asked-kit", "\n".join([*map(words, made), *told]))
