@@ -13,6 +13,7 @@ import os
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from copy import deepcopy
 from functools import cache
 from pathlib import Path
@@ -25,6 +26,15 @@ from pytest_simbench.scene import Robot
 
 CONTENT = "content"
 """Key under which a robot's wire form carries its description."""
+
+
+def last_change(robot: Robot) -> tuple[int, ...]:
+    """When the files were written that describe a robot [ns]: what was read before may be stale."""
+    found = []
+    for path in filter(None, (robot.urdf, robot.srdf)):
+        with suppress(OSError):  # whoever reads it tells
+            found.append(os.stat(path).st_mtime_ns)
+    return tuple(found)
 
 
 def description_xml(robot: Robot) -> ET.Element:

@@ -15,7 +15,7 @@ from typing import Any
 
 from pytest_simbench import __version__
 from pytest_simbench.client.environments import outside
-from pytest_simbench.description.robot_files import CONTENT, with_content
+from pytest_simbench.description.robot_files import CONTENT, last_change, with_content
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.ground.names import file_name
@@ -100,17 +100,17 @@ def versions(case: Case) -> dict[str, str]:
 
 def describe_robot(robot: Robot | None) -> dict[str, str]:
     """Name of a robot and twelve digits of everything that it is; empty for a task's own robot."""
-    return (
-        {}
-        if robot is None
-        else dict(_describe_robot(robot, robot.limits, robot.swing, robot.stand))
-    )
+    if robot is None:
+        return {}
+    changed = last_change(robot)
+    return dict(_describe_robot(robot, changed, robot.limits, robot.swing, robot.stand))
 
 
 @lru_cache(maxsize=16)
 def _describe_robot(
-    robot: Robot, limits: MotionLimits | None, swing: object, stand: Pose | None
-) -> dict[str, str]:
+    robot: Robot, changed: tuple[int, ...], limits: MotionLimits | None, swing: object,
+    stand: Pose | None,
+) -> dict[str, str]:  # fmt: skip
     """The same; what is no part of a robot's equality is an argument."""
     wire = with_content({"robot": robot.to_wire()}, robot)["robot"]
     meshes = sorted(wire[CONTENT].pop("meshes"))  # named by their content

@@ -12,10 +12,10 @@ import pinocchio as pin
 from scipy.spatial import ConvexHull
 
 from pytest_simbench.description.links import link_poses
-from pytest_simbench.description.robot_files import description_xml
+from pytest_simbench.description.robot_files import description_xml, last_change
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.motion.hulls import outward_faces
-from pytest_simbench.motion.model import RobotModel, last_change
+from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import Body, FloatArray, Pose, Robot, Scene
 from pytest_simbench.scene.overlap import box_corners
 

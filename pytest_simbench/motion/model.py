@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
-from contextlib import suppress
 from functools import cache, lru_cache
 
 import numpy as np
 import pinocchio as pin
 
 from pytest_simbench.description.links import check_robot
+from pytest_simbench.description.robot_files import last_change
 from pytest_simbench.scene import Body, Box, FloatArray, MotionLimits, Pose, Robot
 from pytest_simbench.simulator import DescriptionError
 
@@ -207,15 +206,6 @@ def grasping_scale_of(robot: Robot) -> float:
 
 def _tenths(share: float) -> float:
     return min(10, max(1, math.floor(10.0 * share))) / 10.0
-
-
-def last_change(robot: Robot) -> tuple[int, ...]:
-    """When the files were written that describe a robot [ns]: what was read before may be stale."""
-    found = []
-    for path in filter(None, (robot.urdf, robot.srdf)):
-        with suppress(OSError):  # whoever reads it tells
-            found.append(os.stat(path).st_mtime_ns)
-    return tuple(found)
 
 
 @lru_cache(maxsize=64)

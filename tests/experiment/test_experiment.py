@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import pytest
 
 from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.identity import describe_robot
 from pytest_simbench.experiment.repetition import Hooks, Repetition, group
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.laws.free import FreeFall
+from pytest_simbench.motion.registry import find
 from pytest_simbench.tasks.base import Task
+from tests.motion.small_arm import small_arm
 from tests.tiny import Falling
 
 
@@ -21,6 +26,15 @@ class Halved(Falling):
 
     def smoke(self) -> Halved:
         return replace(self, duration=self.duration / 2)
+
+
+def test_a_robot_whose_file_was_changed_is_another_one(tmp_path: Path) -> None:
+    file = small_arm(tmp_path)
+    before, urdf = find(str(file)), file.with_suffix(".urdf")
+    first = describe_robot(before)
+    urdf.write_text(urdf.read_text().replace('<mass value="1"', '<mass value="1.5"', 1))
+    os.utime(urdf, ns=(0, 1))
+    assert describe_robot(find(str(file))) == describe_robot(before) != first
 
 
 def test_the_version_is_chosen_once_whatever_becomes_of_the_case(case: Case) -> None:
