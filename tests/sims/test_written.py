@@ -7,6 +7,7 @@ import hashlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pytest_simbench.sims.gazebo.adapter import Gazebo
@@ -56,7 +57,7 @@ def usd(scene: Scene, prepared: PreparedRobot | None, profile: str, folder: Path
 
 
 @pytest.mark.parametrize("written", [sdf, usd], ids=lambda made: made.__name__)
-def test_worlds(written, tmp_path: Path) -> None:
+def test_worlds(written: Any, tmp_path: Path) -> None:
     lines = []
     profiles = {sdf: Gazebo.profiles, usd: OvPhysX.profiles}[written]
     for scene in scenes():

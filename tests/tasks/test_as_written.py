@@ -95,9 +95,9 @@ def _numbers(value: Any) -> np.ndarray:
 def told(task: Task) -> Iterator[str]:
     """A line for each thing that a task says of itself."""
     scene = task.scene(1001, Jitter(0.001, 0.01))
-    for name in ("bodies", "robot", "starts", "apart"):
-        for each in getattr(scene, name) if name != "robot" else filter(None, [scene.robot]):
-            yield words(each)
+    yield from map(
+        words, (*scene.bodies, *filter(None, [scene.robot]), *scene.starts, *scene.apart)
+    )
     parameters = {k: v for k, v in task.parameters().items() if k != "task.policy_digest"}
     kept = ("name", "gravity", "ground_friction", "ground_restitution", "room", "friction_rule")
     yield words({name: getattr(scene, name) for name in kept})
