@@ -105,6 +105,12 @@ def test_a_file_that_is_cut_off_is_none(size: int) -> None:
         read_tensor(torch_file(ROWS)[:size], "x.pt")
 
 
+def test_another_tensor_is_no_toss(tmp_path: Path) -> None:
+    for rows in (ROWS, np.zeros((2, 3, 19)), np.zeros((3, 19))):
+        with pytest.raises(DataError, match=r"^7\.pt has the shape .*, not \(1, rows, 19\)$"):
+            tosses.convert({"a/7.pt": torch_file(rows)}, tmp_path)
+
+
 def test_nothing_that_a_file_asks_for_is_run(capfd: pytest.CaptureFixture[str]) -> None:
     class Malicious:
         def __reduce__(self) -> tuple[Any, ...]:
