@@ -26,8 +26,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
 from pytest_simbench.report.files import Written, csv_of, write_badge, write_files, write_tables
 from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
-from pytest_simbench.report.markdown.run import render_run, render_task
-from pytest_simbench.report.model import tables
+from pytest_simbench.report.markdown.run import render_run
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.terminal import run as terminal
@@ -80,29 +79,6 @@ def test_without_descriptions_numbers_are_plain_and_a_note_says_why(tmp_path: Pa
     assert {metric.better for metric in summary.metrics} == {None}
     for text in (terminal.render_task(summary, 200), (tmp_path / "report.md").read_text()):
         assert "note: stacking: the run does not say what its metrics mean" in text
-
-
-def test_markdown_tables_hold_one_line_per_row() -> None:
-    phases = {"phases": {"pick": {"cpu_percent": {"mean": 90.0}, "rss_mb": {"mean": 200.0},
-                                  "samples": 10}}}  # fmt: skip
-    records = [replace(r, resources={**r.resources, **phases}) for r in stacking_run()]
-    (summary,) = summarise(records, METRICS)
-    lines = render_task(summary).splitlines()
-    assert lines[0] == "## stacking: 20 repetitions each, protocol fast"
-    assert lines[2] == (
-        "- placed: mujoco 99 % [79, 100] is ahead of pybullet 65 % [40, 78], "
-        "by 33.3 points [16.7, 50]."
-    )
-    assert lines[6:9] == [
-        "| simulator | crashed | placed % | at the end % | CPU % | RAM MB | x real time "
-        "| CPU s/sim s | start s | end s |",
-        "| :-- | --: | --: | --: | --: | --: | --: | --: | --: | --: |",
-        "| mujoco headless tuned | 0 of 20 [0, 17] % "
-        "| 93 / 99 / 100 [79, 100] | 87 / 97 / 100 [77, 99] "
-        "| 99 +- 3 | 150 +- 2 (peak 161) | 20 | 0.048 | 0.80 | 9.8 |",
-    ]
-    assert "| 90 % 200 MB |" in render_task(summary)  # too wide for the terminal
-    assert tables.BY_PHASE not in terminal.render_task(summary, 100)
 
 
 def test_markdown_tables_are_rectangular_whatever_a_message_holds() -> None:

@@ -6,9 +6,11 @@ import builtins
 import re
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock, call
 
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.record import Record
@@ -17,8 +19,9 @@ from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.page import context
 from pytest_simbench.report.page.render import render as html
 from pytest_simbench.report.replay import render
-from pytest_simbench.report.replay.recorded import groups, links
+from pytest_simbench.report.replay.recorded import groups, links, write_bags
 from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
+from pytest_simbench.report.terminal.progress import Progress
 from pytest_simbench.scene import ConvexMesh, Pose
 from pytest_simbench.testing.scenes import wedge
 from tests.recordings.samples import trace
@@ -52,6 +55,36 @@ def test_the_first_seed_of_each_task_comes_first(tmp_path: Path) -> None:
     addresses = links(found)
     assert addresses[id(kept[1])] == addresses[id(kept[2])] == "replay.html#1"
     assert id(without) not in addresses
+
+
+def test_each_trace_is_recorded_until_the_recording_is_newer(tmp_path: Path) -> None:
+    """What cannot be read is told once; the metadata say of whom it is."""
+    kept = keep(tmp_path, record("drake", 1, versions={"drake": "1", "numpy": "2"}), record("dart"))
+    broken, to = tmp_path / f"traces/{file_stem_of(kept[1])}.npz", tmp_path / "to"
+    told, soon = Mock(spec=Progress), pytest.approx(0, abs=60)
+    broken.write_text("torn")
+    count, (problem,) = write_bags(tmp_path, to, [*kept, record("ode")], told)
+    assert (count, problem.startswith(f"no recording: {broken} holds no")) == (1, True)
+    assert told.method_calls == [
+        call.start_test("recordings", 2),
+        call.repetition(1, 1001), call.end_repetition("ok", soon),
+        call.repetition(2, 1001), call.end_repetition("failed", soon),
+        call.end_test(),
+    ]  # fmt: skip
+    metadata = YAML(typ="safe").load(to / "recordings" / file_stem_of(kept[0]) / "metadata.yaml")
+    assert metadata["rosbag2_bagfile_information"]["custom_data"] == {
+        "test": "test_stacking[drake-headless]", "simulator": "drake", "mode": "headless",
+        "profile": "tuned", "task": "stacking", "seed": "1001", "repetition": "1", "status": "ok",
+        "versions": "drake 1, numpy 2",
+    }  # fmt: skip
+    keep(tmp_path, kept[1])
+    assert write_bags(tmp_path, to, kept, told) == (2, [])
+    assert told.method_calls[-4:-2] == [call.start_test("recordings", 1), call.repetition(1, 1001)]
+    (to / "recordings").rename(tmp_path / "away")
+    (to / "recordings").touch()
+    assert write_bags(tmp_path, to, kept, told) == (
+        0, [f"no recording in {to / 'recordings'}: File exists"]
+    )  # fmt: skip
 
 
 def test_the_report_leads_to_the_replay(tmp_path: Path) -> None:
