@@ -24,6 +24,7 @@ from pytest_simbench.report.replay.render import ReplayUnavailable, replay_of
 from pytest_simbench.report.terminal.progress import Progress
 from pytest_simbench.scene import ConvexMesh, Pose
 from pytest_simbench.testing.scenes import wedge
+from tests.approval import assert_approved
 from tests.recordings.samples import trace
 from tests.report.samples import METRICS, record
 
@@ -127,11 +128,18 @@ def test_it_loads_nothing(tmp_path: Path) -> None:
     assert "unsafe-eval" not in page
 
 
-def test_settings_tell_apart_what_names_do_not(tmp_path: Path) -> None:
+def test_the_page_tells_what_somebody_approved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But for what is trimesh's, the player and its style, and the motions."""
+    viewer = '<head><title>x</title><meta name="viewport" x></head><body><script>y</script></body>'
+    monkeypatch.setattr(render._Meshes, "viewer", lambda self: viewer)
+    monkeypatch.setattr(render, "_part", "({})".format)
+    monkeypatch.setattr(render, "packed", lambda of: "packed")
     kept = keep(tmp_path, record("drake", 1), record("drake", 1, mode="gui"))
-    page = replay_of(groups(tmp_path, kept))[0]
-    assert '"label":"drake headless (tuned)"' in page
-    assert '"label":"drake gui (tuned)"' in page
+    page, *told = replay_of(groups(tmp_path, kept))
+    assert told == [1, []]
+    assert_approved("replay", page.replace("},", "},\n"))
 
 
 def test_what_is_drawn_to_scale_is_of_size_1_and_a_mesh_as_it_is(
