@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 import subprocess
@@ -24,7 +22,7 @@ from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report.files import Written, csv_of, write_badge, write_files, write_tables
+from pytest_simbench.report.files import Written, write_badge, write_files, write_tables
 from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
 from pytest_simbench.report.markdown.run import render_run
 from pytest_simbench.report.model.report import Report
@@ -90,19 +88,6 @@ def test_markdown_tables_are_rectangular_whatever_a_message_holds() -> None:
         bars = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
         assert len(bars) == 1
     assert render_run(Report()) == "No repetition was recorded.\n"
-
-
-def test_csv_has_one_line_per_repetition() -> None:
-    records = [
-        record(metrics={"placed": 0.8, "at_end": None}),
-        failed("WorkerHung", "settle", "no answer", repetition=2),
-    ]
-    first, second = csv.DictReader(io.StringIO(csv_of(records), newline=""))
-    assert (first["simulator"], first["repetition"], first["seed"]) == ("mujoco", "1", "1001")
-    assert (first["metrics.placed"], first["metrics.at_end"]) == ("0.8", "")
-    assert (first["cost.rtf"], first["seconds.step"], first["error.type"]) == ("20.0", "8.0", "")
-    assert (second["status"], second["error.type"]) == ("failed", "WorkerHung")
-    assert second["error.message"] == "no answer"
 
 
 names = st.sampled_from(["placed", "ram", "failures", "", "\x1b[31m", "a|b\n<b>", "ä" * 40])

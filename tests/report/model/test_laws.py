@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.measure.sweep import Swept, sweeps
-from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENON
@@ -21,9 +20,8 @@ from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import TaskSummary, at_own_steps, summarise
 from pytest_simbench.report.page.context import page
 from pytest_simbench.report.page.render import render
-from pytest_simbench.report.terminal.parts import render_histories, sweep_lines
+from pytest_simbench.report.terminal.parts import sweep_lines
 from pytest_simbench.report.terminal.run import render_brief, render_run
-from tests.measure.test_law_history import asked, row
 from tests.report.samples import METRICS, failed, record, stacking_run, text, texts
 
 ERROR = (Metric("error", "error", "m", "lower", least=0), Metric("ratio", "ratio", "", "lower"))
@@ -196,18 +194,3 @@ def test_markdown_and_page_hold_them(tmp_path: Path, records: list[Record]) -> N
     own = [r for r in SWEPT if not r.swept]
     assert swept(own) == []
     assert 'id="steps"' not in render(page(tmp_path, Report(summaries(own), own)))
-
-
-def test_releases_are_told_in_lines_and_in_markdown() -> None:
-    records = [
-        *row("fall", 0.2, 0.2, 0.2, 0.2, phenomenon="free motion"),
-        *row("tower", 0.1, 0.1, None, 0.1),
-        *asked("glide", "2.0", 50.0),
-    ]
-    found = Report.of(RunContents(records=tuple(records))).histories
-    assert render_histories(found, 60).splitlines()[:2] == [
-        "engine, 3 laws (headless tuned), 4 releases, 1.2 to 2.0:",
-        "  1.10: tower fails (0.1x before): WorkerHung: no answer",
-    ]
-    written = markdown(Report(summaries(run()), histories=found))
-    assert "## History: engine, 3 laws (headless tuned)\n\n- 1.10: tower fails" in written

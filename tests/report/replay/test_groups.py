@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import builtins
 import re
+import zlib
+from base64 import b64decode
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock, call
@@ -136,10 +138,21 @@ def test_the_page_tells_what_somebody_approved(
     monkeypatch.setattr(render._Meshes, "viewer", lambda self: viewer)
     monkeypatch.setattr(render, "_part", "({})".format)
     monkeypatch.setattr(render, "packed", lambda of: "packed")
-    kept = keep(tmp_path, record("drake", 1), record("drake", 1, mode="gui"))
+    kept = keep(tmp_path, record("drake", 1), record("<b>", 1, mode="gui"), record("<b>", 1))
     page, *told = replay_of(groups(tmp_path, kept))
     assert told == [1, []]
     assert_approved("replay", page.replace("},", "},\n"))
+
+
+def test_a_motion_is_packed_in_steps_of_a_tenth_of_a_millimetre() -> None:
+    """And nothing is farther away than ten kilometres."""
+    kept = trace()
+    kept.bodies[3, 1, 0], kept.bodies[3, 1, 1] = 1e9, -1e9
+    steps = np.frombuffer(zlib.decompress(b64decode(render.packed(kept))), "<i4")
+    found = np.cumsum(steps.reshape(-1, len(kept.time)), axis=1).T / 10_000
+    poses = np.clip(kept.bodies[:, :, :7].reshape(len(kept.time), -1), -1e4, 1e4)
+    wanted = np.column_stack([kept.time, kept.joints[:, 0], poses])
+    assert found == pytest.approx(wanted, abs=0.6e-4)
 
 
 def test_what_is_drawn_to_scale_is_of_size_1_and_a_mesh_as_it_is(
@@ -150,6 +163,7 @@ def test_what_is_drawn_to_scale_is_of_size_1_and_a_mesh_as_it_is(
     meshes = render._Meshes()
     meshes.body(ConvexMesh("wedge", wedge(), Pose.at(1.0, 0.0, 0.0), 1.0))
     meshes.viewer()
+    assert list(drawn[0].graph.nodes_geometry) == ["box", "ball", "tube", "mesh_0"]
     *solids, mesh = drawn[0].geometry.values()
     assert mesh.bounds == pytest.approx(np.array([np.min(wedge(), 0), np.max(wedge(), 0)]))
     sizes = [solid.extents for solid in solids]
