@@ -16,6 +16,7 @@ from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.scene import Box, Compound, Pose, Scene
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.tasks import Log
+from tests.approval import assert_approved
 from tests.recordings.samples import motion, scene
 from tests.tasks.scripted_scene import SCENE
 
@@ -116,7 +117,10 @@ def test_bodies_start_and_end_where_the_log_has_them(tmp_path: Path) -> None:
     """In the frames of the file, which lies 0.2 m below the scene."""
     poses = np.tile([1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (21, 1))
     poses[:, 1] = TIME
-    log = read_log(npz(tmp_path, time=TIME, hinge=HINGE, **{"table/pose": poses}), WHOLE)
+    told = {"hinge/effort": TIME, "slider/command": 0.1 * TIME, "slider/velocity": 0.2 * TIME}
+    path = npz(tmp_path, time=TIME, hinge=TIME + 0.1, **told, **{"table/pose": poses})
+    log = read_log(path, WHOLE)
+    assert_approved("log", str(log))
     assert log.start.bodies == log.end.bodies == ("table",)
     assert log.end.poses[0].position == pytest.approx((1.0, 1.0, 0.2))
     body = WHOLE.at_start(log.start).body("table")

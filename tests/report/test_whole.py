@@ -165,7 +165,14 @@ def test_a_whole_report(
     report = Report.of(reading, outcome.compared, outcome.looks)
     written = write_files(tmp_path, report)
     shown = json.dumps(page(tmp_path, report), indent=1, default=plain, ensure_ascii=False)
+    known = [
+        *(difference for summary in report.summaries for difference in summary.differences),
+        *(pair for found in report.transfers for pair in (*found.pairs.values(), found.mmrv(0, 1))),
+        *(vars(found).get("courses", found) for found in report.histories),
+        *report.sweeps, *report.settled,
+    ]  # fmt: skip
     texts = [
+        *map(str, known),
         *written.problems,
         *((tmp_path / name).read_text() for name in ("report.md", "report.csv", "outcome.json")),
         *terminal(report, tmp_path, 80), *terminal(report, tmp_path, 130),

@@ -101,6 +101,8 @@ def test_what_has_no_right_value_is_not_tuned_for() -> None:
 
     with pytest.raises(TuningError, match="the right height; .* --error METRIC with landed$"):
         target("t.py::test_it", "cpu_cost", "height", 4, 9, asked=(Lifting(), ()))
+    with pytest.raises(TuningError, match=r" --error converged:METRIC with height, landed$"):
+        target("t.py::test_it", "cpu_cost", "converged", 4, 9, asked=(Lifting(), ()))
 
 
 def test_claims_are_of_the_mean() -> None:
