@@ -127,7 +127,7 @@ def test_bodies_start_and_end_where_the_log_has_them(tmp_path: Path) -> None:
     assert body.pose.position == pytest.approx((1.0, 0.0, 0.3))
 
 
-def test_a_recording_of_ours_is_read_back(tmp_path: Path) -> None:
+def test_a_recording_of_ours_is_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kept, world = Trace.of(scene(), motion(), []), scene()
     write_bag(kept, tmp_path / "run")
     log = read_log(tmp_path / "run" / "run.mcap", world)
@@ -136,6 +136,9 @@ def test_a_recording_of_ours_is_read_back(tmp_path: Path) -> None:
     ends = dict(zip(log.end.bodies, log.end.poses, strict=True))
     for name, row in zip(kept.body_names, kept.bodies[-1], strict=True):
         assert ends[name].as_array() == pytest.approx(row[:7], abs=1e-5)
+    monkeypatch.setattr(logs, "MOST", 30)
+    with pytest.raises(DescriptionError, match="is no recording: it holds more than 30 messages"):
+        read_log(tmp_path / "run" / "run.mcap", world)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +148,7 @@ def test_a_recording_of_ours_is_read_back(tmp_path: Path) -> None:
         ({"time": TIME, "table/pose": np.zeros((21, 7)), "hinge": TIME}, "no unit length"),
         ({"time": TIME, "hinge": TIME * np.nan}, "no finite number of 'hinge' in row 0"),
         ({"time": TIME[::-1], "hinge": TIME}, "goes from 1 s to 0.95 s in row 1"),
-        ({"time": TIME * 0, "hinge": TIME}, "goes from 0 s to 0 s in row 1"),
+        ({"time": np.minimum(TIME, 0.5), "hinge": TIME}, "goes from 0.5 s to 0.5 s in row 11"),
         ({"time": TIME, "hinge": TIME[1:]}, r"'hinge' in the shape \(20,\) instead of \(21,\)"),
         ({"time": TIME, "hinge": np.array(["a"] * 21)}, "which is no column of numbers"),
         ({"time": np.array(3.0), "hinge": TIME}, "which is no column of numbers"),
@@ -181,8 +184,9 @@ def test_a_table_that_cannot_be_is_told_with_its_line(tmp_path: Path, text: str,
 def test_what_is_no_log_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(DescriptionError, match=r"log.txt is no log; give .npz, .csv, .mcap"):
         read_log(tmp_path / "log.txt", SCENE)
-    with pytest.raises(DescriptionError, match="No such file"):
-        read_log(tmp_path / "log.csv", SCENE)
+    for name in ("log.csv", "log.mcap"):
+        with pytest.raises(DescriptionError, match="the log .*: No such file"):
+            read_log(tmp_path / name, SCENE)
     (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n and no more")
     with pytest.raises(DescriptionError, match="log.mcap is no recording"):
         read_log(tmp_path / "log.mcap", SCENE)

@@ -83,6 +83,7 @@ def laws(folder: RunFolder) -> RunOutcome:
     """Laws on two simulators, one of them over time steps; and what is repeatable."""
     swept = [law("mujoco", "fall", 0.1 / h, step=h) for h in STEPS]
     swept += [law("drake", name, 9.0, step=h) for name in ("sag", "creep") for h in STEPS]
+    swept += [law("ode", "fall", None if h == 0.002 else 2e-3 / h, step=h) for h in STEPS]
     for one in (*run_of_laws(), *swept, law("pybullet", "fall", 3.0, "default")):
         folder.append(one)
     for line in (LINE, REPLAY):

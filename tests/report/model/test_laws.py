@@ -20,9 +20,8 @@ from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import TaskSummary, at_own_steps, summarise
 from pytest_simbench.report.page.context import page
 from pytest_simbench.report.page.render import render
-from pytest_simbench.report.terminal.parts import sweep_lines
 from pytest_simbench.report.terminal.run import render_brief, render_run
-from tests.report.samples import METRICS, failed, record, stacking_run, text, texts
+from tests.report.samples import METRICS, failed, record, stacking_run, texts
 
 ERROR = (Metric("error", "error", "m", "lower", least=0), Metric("ratio", "ratio", "", "lower"))
 LAWS = {"sag": "joints", "creep": "sticking", "stick": "sticking", "fall": "free motion"}
@@ -157,21 +156,6 @@ def test_profiles_of_a_sweep_are_told_apart() -> None:
     other = [law("mujoco", "fall", 0.1, "default", h) for h in STEPS]
     names = list(sweep.labels(swept([*SWEPT[:3], *other])).values())
     assert names == ["mujoco (default)", "mujoco (tuned)"]
-
-
-def test_the_terminal_tells_the_table_and_what_failed() -> None:
-    short, whole = ("\n".join(sweep_lines(swept(), 80, verbose)) for verbose in (False, True))
-    assert whole.startswith(short)
-    assert short.startswith(text(
-        """
-        simulator    free motion
-        ------------------------
-        mujoco     1/1 1ms 0.010
-        ode                  0/1
-        """
-    ))  # fmt: skip
-    assert "ode fails fall at 2ms: it left the room" in short
-    assert "order of convergence" in whole.removeprefix(short)
 
 
 def test_laws_at_other_steps_are_in_no_other_table_and_other_tasks_are() -> None:
