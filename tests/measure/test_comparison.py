@@ -279,9 +279,8 @@ def test_so_many_values_that_their_permutations_are_normal() -> None:
     """By hand, z = 60 / 30 of 900 signs; and by Mantel and Haenszel's chi-square of two shares."""
     none, signs = np.zeros(900), np.repeat([1.0, -1.0], [480, 420])
     ways: dict[Any, float] = {"two-sided": 0.0455, "greater": 0.02275, "less": 0.97725}
-    for way, p in ways.items():
-        found = compare(none, signs, paired=True, alternative=way)
-        assert found.p_value == pytest.approx(p, abs=1e-5)
+    found = {way: compare(none, signs, paired=True, alternative=way).p_value for way in ways}
+    assert found == pytest.approx(ways, abs=1e-5)
     first, second = np.repeat([0.0, 1.0], [350, 250]), np.repeat([0.0, 1.0], [640, 560])
     table = chi2_contingency([[350, 250], [640, 560]], correction=False).statistic * 1799 / 1800
     assert compare(first, second).p_value == pytest.approx(chi2.sf(table, 1))

@@ -85,9 +85,8 @@ def test_each_trace_is_recorded_until_the_recording_is_newer(tmp_path: Path) -> 
     assert told.method_calls[-4:-2] == [call.start_test("recordings", 1), call.repetition(1, 1001)]
     (to / "recordings").rename(tmp_path / "away")
     (to / "recordings").touch()
-    assert write_bags(tmp_path, to, kept, told) == (
-        0, [f"no recording in {to / 'recordings'}: File exists"]
-    )  # fmt: skip
+    wrong = f"no recording in {to / 'recordings'}: File exists"
+    assert write_bags(tmp_path, to, kept, told) == (0, [wrong])
 
 
 def test_the_report_leads_to_the_replay(tmp_path: Path) -> None:
