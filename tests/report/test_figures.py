@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.axis import Axis
@@ -84,7 +85,6 @@ def in_words(picture: Picture) -> Iterator[str]:
 
 
 def of_tasks() -> Iterator[Picture]:
-    """Of one simulator that failed each time, and of a task that was interrupted."""
     used = {
         name: {"cpu_percent": {"mean": cpu}, "rss_mb": {"mean": 2 * cpu}, "samples": 5}
         for name, cpu in (("pick", 90.0), ("place", 95.0))
@@ -92,8 +92,8 @@ def of_tasks() -> Iterator[Picture]:
     kept = [replace(r, resources={**r.resources, "phases": used}) for r in stacking_run()]
     lost = failed("WorkerHung", "load", "no answer", simulator="drake")
     cut = record(status="interrupted", task="cut short")
-    right = {**REFERENCES, "stacking": {"placed": 1.0}}
-    for found in summarise([*kept, lost, cut, *throwing_run()], METRICS, right):
+    records, right = [*kept, lost, cut, *throwing_run()], {"stacking": {"placed": 1.0}}
+    for found in summarise(records, METRICS, REFERENCES | right):
         yield from (*task.pictures([found]), *task.on_page(found))
 
 
@@ -135,6 +135,7 @@ def of_a_search() -> Iterator[Picture]:
     yield Picture("none", partial(front.draw, points[2:3], points[2:3], points[2], "ram", ""))
 
 
+@pytest.mark.skipif(matplotlib.__version_info__[:2] != (3, 11), reason="others draw otherwise")
 @pytest.mark.parametrize("made", [of_tasks, of_releases, of_steps, of_ranks, of_a_search])
 def test_pictures_show_what_somebody_approved(made: Any) -> None:
     with drawing():
@@ -163,8 +164,7 @@ def test_the_folder_holds_all_pictures(tmp_path: Path) -> None:
     for name in (first, *drawn):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
         assert f"]({name})" in told
-    assert transfer.CAPTION in page
-    assert "<image" not in page
+    assert (transfer.CAPTION in page, "<image" in page) == (True, False)  # it takes vectors alone
 
 
 def test_without_matplotlib_one_line_says_so(
