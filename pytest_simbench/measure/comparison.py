@@ -197,7 +197,7 @@ def _normal(difference: float, variance: float, alternative: Alternative) -> flo
         return 1.0
     z = difference / math.sqrt(variance)
     less = {"less": z, "greater": -z, "two-sided": -abs(z)}[alternative]
-    return min(1.0, float(ndtr(less)) * (2 if alternative == "two-sided" else 1))
+    return float(ndtr(less)) * (2 if alternative == "two-sided" else 1)
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

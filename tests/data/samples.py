@@ -8,6 +8,7 @@ import struct
 import sys
 import tarfile
 import types
+from collections import OrderedDict
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -35,7 +36,7 @@ def torch_file(array: FloatArray, kind: str = "Double", order: Literal["C", "F"]
         def __reduce__(self) -> tuple[Any, ...]:
             laid = np.asarray(array, order=order)
             stride = tuple(step // laid.itemsize for step in laid.strides)
-            return rebuild, (Key(), 0, array.shape, stride, False, {})
+            return rebuild, (Key(), 0, array.shape, stride, False, OrderedDict())
 
     class Key: ...
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pytest_simbench.data import DataError, DataMissing, read, tosses
+from pytest_simbench.data import DataError, DataMissing, read
 from pytest_simbench.data.download import digest, download
 from pytest_simbench.data.sets import SETS, DataSet, data_set, default_folder
 from tests.data.samples import archive, falling, source_file
@@ -39,7 +39,7 @@ def source(tmp_path: Path) -> Local:
 def test_a_set_is_brought_checked_and_read(source: Local, tmp_path: Path) -> None:
     told: list[str] = []
     download(source, tmp_path / "new" / "data", told.append)
-    found = tosses.read(tmp_path / "new" / "data")
+    found = read("cube_tosses", tmp_path / "new" / "data")
     assert [toss.index for toss in found.items] == [0, 1, 10]
     for toss in found.items:
         assert np.allclose(toss.state, falling(10 + toss.index), rtol=0, atol=1e-15)

@@ -52,6 +52,9 @@ def test_what_is_no_clean_impact_of_one_corner_is_left_out() -> None:
     for rows in (later, slow, bent, wall, toss(angle=0.05), toss(height=0.004), toss(at=8.5)):
         assert clean_impacts(1, rows) == []
     assert clean_impacts(1, toss()[:20]) == []  # none at all
+    n = impacts.FLIGHT  # as many rows as it takes, on either side
+    for at, rows, many in ((n - 0.7, 2 * n, 1), (n - 0.7, 2 * n - 1, 0), (n - 1.7, 2 * n, 0)):
+        assert len(clean_impacts(1, toss(at=at, rows=rows))) == many
 
 
 def test_the_lowest_corner_is_the_lowest_of_four() -> None:

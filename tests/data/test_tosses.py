@@ -105,6 +105,17 @@ def test_a_file_that_is_cut_off_is_none(size: int) -> None:
         read_tensor(torch_file(ROWS)[:size], "x.pt")
 
 
+def test_lengths_of_the_source_are_halves_of_the_edge(tmp_path: Path) -> None:
+    """And another tensor is no toss."""
+    tensor, half = np.ones((1, 2, 19)), [tosses.EDGE / 2] * 3
+    tensor[:, :, 4:7] = 0.0
+    tosses.convert({"a/7.pt": torch_file(tensor)}, tmp_path)
+    assert (tosses.read(tmp_path).items[0].state == [*half, 1, 0, 0, 0, *half, 1, 1, 1]).all()
+    for rows in (ROWS, np.zeros((2, 3, 19)), np.zeros((3, 19))):
+        with pytest.raises(DataError, match=r"^7\.pt has the shape .*, not \(1, rows, 19\)$"):
+            tosses.convert({"a/7.pt": torch_file(rows)}, tmp_path)
+
+
 def test_nothing_that_a_file_asks_for_is_run(capfd: pytest.CaptureFixture[str]) -> None:
     class Malicious:
         def __reduce__(self) -> tuple[Any, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import chi2, chi2_contingency
 
 from pytest_simbench.measure import comparison
 from pytest_simbench.measure.comparison import (
@@ -272,6 +273,18 @@ def test_many_values_are_judged_as_few_are(
     sides = 2 if alternative == "two-sided" else 1
     drawn = sides * (2 * slow / sides * (1 - slow / sides) / 9999) ** 0.5  # of two such draws
     assert quick == pytest.approx(slow, abs=0.003 + 4 * drawn)
+
+
+def test_so_many_values_that_their_permutations_are_normal() -> None:
+    """By hand, z = 60 / 30 of 900 signs; and by Mantel and Haenszel's chi-square of two shares."""
+    none, signs = np.zeros(900), np.repeat([1.0, -1.0], [480, 420])
+    ways: dict[Any, float] = {"two-sided": 0.0455, "greater": 0.02275, "less": 0.97725}
+    found = {way: compare(none, signs, paired=True, alternative=way).p_value for way in ways}
+    assert found == pytest.approx(ways, abs=1e-5)
+    first, second = np.repeat([0.0, 1.0], [350, 250]), np.repeat([0.0, 1.0], [640, 560])
+    table = chi2_contingency([[350, 250], [640, 560]], correction=False).statistic * 1799 / 1800
+    assert compare(first, second).p_value == pytest.approx(chi2.sf(table, 1))
+    assert compare(first * 0, second * 0).p_value == 1.0
 
 
 def test_one_failure_in_ten_thousand_is_no_difference() -> None:

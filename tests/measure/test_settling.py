@@ -98,7 +98,7 @@ def test_equal_ends_of_one_start_that_is_unstable_are_no_agreement() -> None:
 def test_a_crash_is_told_and_other_scenes_stay_apart() -> None:
     other = {"settings": {**end("a", 0).settings, "task.scene": "cup"}}
     records = [
-        end("a", 0.0), end("b", 9.0), end("a", 0.0, moved=1e-3),
+        end("c", 0.0, details={}), end("a", 0.0), end("b", 9.0), end("a", 0.0, moved=1e-3),
         end("a", 0.0, moved=1e-3, seed=2, status="failed", details={}, metrics={}),
         end("a", 3.0, **other), end("b", 3.0, **other),
     ]  # fmt: skip
@@ -108,6 +108,9 @@ def test_a_crash_is_told_and_other_scenes_stay_apart() -> None:
     assert heads == ["simulator", "as written", "moved by 1 mm", "CPU s/sim s"]
     moved = section(bowl).tables[0].columns[2]
     assert [cell.text for cell in moved.cells] == ["100 % 0 1 crashed", "-"]
+    for key in ("task.scene", "task.scene_digest", "task.seconds", "task.starts"):
+        other = {"settings": {**end("a", 0).settings, key: 3}}
+        assert len(settlings([*records[1:3], *(end(who, 3.0, **other) for who in "ab")])) == 2
 
 
 def test_one_simulator_without_moved_starts_is_no_comparison() -> None:

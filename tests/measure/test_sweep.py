@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from pytest_simbench.measure.sweep import Swept, choice, sweeps, tolerance_at
+from pytest_simbench.measure.sweep import Point, Swept, choice, sweeps, tolerance_at
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENON
-from pytest_simbench.records.readings import Reading
+from pytest_simbench.records.readings import Reading, rounding
 from pytest_simbench.records.record import Failure, Record
 from tests.records import build
 
@@ -53,8 +53,9 @@ def test_a_line_is_a_simulators_errors_with_the_longest_step_first() -> None:
     (line,) = found.lines
     assert (found.law, found.phenomenon, found.unit) == ("fall", "free motion", "m")
     assert line.who == MUJOCO
-    assert [p.step for p in line.points] == list(STEPS)
-    assert [p.cost for p in line.points] == pytest.approx([0.25, 0.5, 1.0, 2.0])
+    assert line.points == tuple(
+        Point(h, 5 * h, 10 * h, pytest.approx(1e-3 / h), rounding(4.9, round(1 / h))) for h in STEPS
+    )
     assert line.order.order == pytest.approx(1)
     assert found.tolerances == {h: 10 * h for h in STEPS}
     assert found.allowed == pytest.approx(0.01)
@@ -90,8 +91,7 @@ def test_the_worst_repetition_counts_and_one_that_was_cut_short_does_not() -> No
 def test_a_failure_is_kept_with_its_message_and_left_out_of_the_order() -> None:
     """It failed before its engine told a version, and belongs to the others all the same."""
     (line,) = one([law(0.004, None), *(law(h, h) for h in STEPS[1:])]).lines
-    assert math.isinf(line.points[0].error)
-    assert line.points[0].message == "the worker was killed"
+    assert line.points[0] == Point(0.004, math.inf, None, 0.25, message="the worker was killed")
     assert (line.order.points, line.order.order) == (3, pytest.approx(1))
 
 

@@ -4,6 +4,7 @@ the ceiling by planted rates."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -212,8 +213,9 @@ def test_what_has_no_like_is_left_out_and_the_others_are_compared() -> None:
 
 
 def test_other_work_is_no_transfer() -> None:
-    two = transfers([*whole(), *whole(**{"task.seconds": 3})])
-    assert [found.seeds for found in two] == [11, 11]
+    other = [replace(r, robot={"name": "ur5"}) for r in whole()]
+    other += [replace(r, jitter=0.1) for r in whole()] + whole(**{"task.seconds": 3})
+    assert [found.seeds for found in transfers([*whole(), *other])] == [11] * 4
     alone = [r for r in whole() if r.simulator == "a"]
     few = [r for r in whole() if r.seed < 5]
     single = [r for r in whole() if r.settings["task.policy"] == "bad"]

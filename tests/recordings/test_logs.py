@@ -16,6 +16,7 @@ from pytest_simbench.recordings.trace import Trace
 from pytest_simbench.scene import Box, Compound, Pose, Scene
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.tasks import Log
+from tests.approval import assert_approved
 from tests.recordings.samples import motion, scene
 from tests.tasks.scripted_scene import SCENE
 
@@ -116,14 +117,17 @@ def test_bodies_start_and_end_where_the_log_has_them(tmp_path: Path) -> None:
     """In the frames of the file, which lies 0.2 m below the scene."""
     poses = np.tile([1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (21, 1))
     poses[:, 1] = TIME
-    log = read_log(npz(tmp_path, time=TIME, hinge=HINGE, **{"table/pose": poses}), WHOLE)
+    told = {"hinge/effort": TIME, "slider/command": 0.1 * TIME, "slider/velocity": 0.2 * TIME}
+    path = npz(tmp_path, time=TIME, hinge=TIME + 0.1, **told, **{"table/pose": poses})
+    log = read_log(path, WHOLE)
+    assert_approved("log", str(log))
     assert log.start.bodies == log.end.bodies == ("table",)
     assert log.end.poses[0].position == pytest.approx((1.0, 1.0, 0.2))
     body = WHOLE.at_start(log.start).body("table")
     assert body.pose.position == pytest.approx((1.0, 0.0, 0.3))
 
 
-def test_a_recording_of_ours_is_read_back(tmp_path: Path) -> None:
+def test_a_recording_of_ours_is_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kept, world = Trace.of(scene(), motion(), []), scene()
     write_bag(kept, tmp_path / "run")
     log = read_log(tmp_path / "run" / "run.mcap", world)
@@ -132,6 +136,9 @@ def test_a_recording_of_ours_is_read_back(tmp_path: Path) -> None:
     ends = dict(zip(log.end.bodies, log.end.poses, strict=True))
     for name, row in zip(kept.body_names, kept.bodies[-1], strict=True):
         assert ends[name].as_array() == pytest.approx(row[:7], abs=1e-5)
+    monkeypatch.setattr(logs, "MOST", 30)
+    with pytest.raises(DescriptionError, match="is no recording: it holds more than 30 messages"):
+        read_log(tmp_path / "run" / "run.mcap", world)
 
 
 @pytest.mark.parametrize(
@@ -141,7 +148,7 @@ def test_a_recording_of_ours_is_read_back(tmp_path: Path) -> None:
         ({"time": TIME, "table/pose": np.zeros((21, 7)), "hinge": TIME}, "no unit length"),
         ({"time": TIME, "hinge": TIME * np.nan}, "no finite number of 'hinge' in row 0"),
         ({"time": TIME[::-1], "hinge": TIME}, "goes from 1 s to 0.95 s in row 1"),
-        ({"time": TIME * 0, "hinge": TIME}, "goes from 0 s to 0 s in row 1"),
+        ({"time": np.minimum(TIME, 0.5), "hinge": TIME}, "goes from 0.5 s to 0.5 s in row 11"),
         ({"time": TIME, "hinge": TIME[1:]}, r"'hinge' in the shape \(20,\) instead of \(21,\)"),
         ({"time": TIME, "hinge": np.array(["a"] * 21)}, "which is no column of numbers"),
         ({"time": np.array(3.0), "hinge": TIME}, "which is no column of numbers"),
@@ -177,8 +184,9 @@ def test_a_table_that_cannot_be_is_told_with_its_line(tmp_path: Path, text: str,
 def test_what_is_no_log_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(DescriptionError, match=r"log.txt is no log; give .npz, .csv, .mcap"):
         read_log(tmp_path / "log.txt", SCENE)
-    with pytest.raises(DescriptionError, match="No such file"):
-        read_log(tmp_path / "log.csv", SCENE)
+    for name in ("log.csv", "log.mcap"):
+        with pytest.raises(DescriptionError, match="the log .*: No such file"):
+            read_log(tmp_path / name, SCENE)
     (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n and no more")
     with pytest.raises(DescriptionError, match="log.mcap is no recording"):
         read_log(tmp_path / "log.mcap", SCENE)

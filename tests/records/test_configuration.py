@@ -147,6 +147,7 @@ def test_another_robot_is_named() -> None:
         'robot.name was absent, is "ur5" (t)',
         'robot.digest was absent, is "12ab" (t)',
     ]
+    assert differences({"t": runs["t"][::-1]})[0] == 'robot.name was "ur5", is absent (t)'
     runs = {"t": ([whole(robot={**ur5, "digest": "34cd"})], [whole(robot=ur5)])}
     assert differences(runs) == ['robot.digest was "34cd", is "12ab" (t)']
 

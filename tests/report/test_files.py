@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 import subprocess
@@ -24,10 +22,9 @@ from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report.files import Written, csv_of, write_badge, write_files, write_tables
+from pytest_simbench.report.files import Written, write_badge, write_files, write_tables
 from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
-from pytest_simbench.report.markdown.run import render_run, render_task
-from pytest_simbench.report.model import tables
+from pytest_simbench.report.markdown.run import render_run
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.terminal import run as terminal
@@ -82,29 +79,6 @@ def test_without_descriptions_numbers_are_plain_and_a_note_says_why(tmp_path: Pa
         assert "note: stacking: the run does not say what its metrics mean" in text
 
 
-def test_markdown_tables_hold_one_line_per_row() -> None:
-    phases = {"phases": {"pick": {"cpu_percent": {"mean": 90.0}, "rss_mb": {"mean": 200.0},
-                                  "samples": 10}}}  # fmt: skip
-    records = [replace(r, resources={**r.resources, **phases}) for r in stacking_run()]
-    (summary,) = summarise(records, METRICS)
-    lines = render_task(summary).splitlines()
-    assert lines[0] == "## stacking: 20 repetitions each, protocol fast"
-    assert lines[2] == (
-        "- placed: mujoco 99 % [79, 100] is ahead of pybullet 65 % [40, 78], "
-        "by 33.3 points [16.7, 50]."
-    )
-    assert lines[6:9] == [
-        "| simulator | crashed | placed % | at the end % | CPU % | RAM MB | x real time "
-        "| CPU s/sim s | start s | end s |",
-        "| :-- | --: | --: | --: | --: | --: | --: | --: | --: | --: |",
-        "| mujoco headless tuned | 0 of 20 [0, 17] % "
-        "| 93 / 99 / 100 [79, 100] | 87 / 97 / 100 [77, 99] "
-        "| 99 +- 3 | 150 +- 2 (peak 161) | 20 | 0.048 | 0.80 | 9.8 |",
-    ]
-    assert "| 90 % 200 MB |" in render_task(summary)  # too wide for the terminal
-    assert tables.BY_PHASE not in terminal.render_task(summary, 100)
-
-
 def test_markdown_tables_are_rectangular_whatever_a_message_holds() -> None:
     records = [failed("WorkerDied", "load", "a | b\n<script> `c` *d*"), *throwing_run()]
     report = render_run(Report(summarise(records, METRICS, REFERENCES)), ["a.png"])
@@ -114,19 +88,6 @@ def test_markdown_tables_are_rectangular_whatever_a_message_holds() -> None:
         bars = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
         assert len(bars) == 1
     assert render_run(Report()) == "No repetition was recorded.\n"
-
-
-def test_csv_has_one_line_per_repetition() -> None:
-    records = [
-        record(metrics={"placed": 0.8, "at_end": None}),
-        failed("WorkerHung", "settle", "no answer", repetition=2),
-    ]
-    first, second = csv.DictReader(io.StringIO(csv_of(records), newline=""))
-    assert (first["simulator"], first["repetition"], first["seed"]) == ("mujoco", "1", "1001")
-    assert (first["metrics.placed"], first["metrics.at_end"]) == ("0.8", "")
-    assert (first["cost.rtf"], first["seconds.step"], first["error.type"]) == ("20.0", "8.0", "")
-    assert (second["status"], second["error.type"]) == ("failed", "WorkerHung")
-    assert second["error.message"] == "no answer"
 
 
 names = st.sampled_from(["placed", "ram", "failures", "", "\x1b[31m", "a|b\n<b>", "ä" * 40])

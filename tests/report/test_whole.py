@@ -58,6 +58,9 @@ def tasks(folder: RunFolder) -> RunOutcome:
     now += [replace(r, notes=notes, jitter=0.5) for r in stacking_run("gui") if r.repetition < 4]
     now.append(replace(record("mujoco", 10), status="interrupted"))
     now = [replace(r, settings={"timestep": 0.002, "task.settle": 60.0}) for r in now]
+    used = {"cpu_percent": {"mean": 90.0}, "rss_mb": {"mean": 200.0}, "samples": 5}
+    phases = {**now[0].resources, "phases": {"pick": used, "place": used}}
+    now[0] = replace(now[0], resources=phases, reasons=("cube_07 slipped at 3.2 s",))
     for one in now:
         folder.append(one)
     folder.ask(Threshold(now[0].test, "placed", 0.5))
@@ -80,6 +83,7 @@ def laws(folder: RunFolder) -> RunOutcome:
     """Laws on two simulators, one of them over time steps; and what is repeatable."""
     swept = [law("mujoco", "fall", 0.1 / h, step=h) for h in STEPS]
     swept += [law("drake", name, 9.0, step=h) for name in ("sag", "creep") for h in STEPS]
+    swept += [law("ode", "fall", None if h == 0.002 else 2e-3 / h, step=h) for h in STEPS]
     for one in (*run_of_laws(), *swept, law("pybullet", "fall", 3.0, "default")):
         folder.append(one)
     for line in (LINE, REPLAY):
@@ -162,7 +166,14 @@ def test_a_whole_report(
     report = Report.of(reading, outcome.compared, outcome.looks)
     written = write_files(tmp_path, report)
     shown = json.dumps(page(tmp_path, report), indent=1, default=plain, ensure_ascii=False)
+    known = [
+        *(difference for summary in report.summaries for difference in summary.differences),
+        *(pair for found in report.transfers for pair in (*found.pairs.values(), found.mmrv(0, 1))),
+        *(vars(found).get("courses", found) for found in report.histories),
+        *report.sweeps, *report.settled,
+    ]  # fmt: skip
     texts = [
+        *map(str, known),
         *written.problems,
         *((tmp_path / name).read_text() for name in ("report.md", "report.csv", "outcome.json")),
         *terminal(report, tmp_path, 80), *terminal(report, tmp_path, 130),

@@ -95,6 +95,14 @@ def test_what_only_ratios_tell_is_not_determined() -> None:
     )
     assert all(of.why for of in found.values())
 
+    def inverse(of: Mapping[str, float], start: float) -> FloatArray:
+        return swing({**of, "spring:slider": 90.0**2 / of["spring:slider"]}, start)
+
+    found, _ = fit(list(TRUTH), motion=inverse)
+    assert found["armature:slider"].why == (
+        "the log tells its ratio to passive_damping:slider and its product with spring:slider alone"
+    )
+
 
 def test_what_only_a_product_tells_is_not_determined() -> None:
     def mixed(of: Mapping[str, float], start: float) -> FloatArray:

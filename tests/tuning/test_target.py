@@ -101,6 +101,8 @@ def test_what_has_no_right_value_is_not_tuned_for() -> None:
 
     with pytest.raises(TuningError, match="the right height; .* --error METRIC with landed$"):
         target("t.py::test_it", "cpu_cost", "height", 4, 9, asked=(Lifting(), ()))
+    with pytest.raises(TuningError, match=r" --error converged:METRIC with height, landed$"):
+        target("t.py::test_it", "cpu_cost", "converged", 4, 9, asked=(Lifting(), ()))
 
 
 def test_claims_are_of_the_mean() -> None:
@@ -141,12 +143,11 @@ def test_measured_data_have_their_halves(monkeypatch: pytest.MonkeyPatch) -> Non
     assert [vars(looks[0].task)["half"] for looks in (found.chosen, found.judged)] == [
         "chosen_on", "held_out",
     ]  # fmt: skip
-    assert found.claims == asked[1]
-    assert found.word == "test_tossing"
+    assert (found.claims, found.word) == (asked[1], "test_tossing")
 
 
 @pytest.mark.parametrize(
-    ("starts", "halves"), [(0, (1, 0)), (1, (1, 0)), (5, (3, 2)), (20, (4, 9))]
+    ("starts", "halves"), [(0, (1, 0)), (1, (1, 0)), (4, (2, 2)), (5, (3, 2)), (20, (4, 9))]
 )
 def test_starts_of_a_scene_are_not_judged_again(starts: int, halves: tuple[int, int]) -> None:
     body = cube("c", Pose.at(0.0, 0.0, 0.025), WHITE)
@@ -156,7 +157,10 @@ def test_starts_of_a_scene_are_not_judged_again(starts: int, halves: tuple[int, 
     numbers = [[look.number for look in looks] for looks in (found.chosen, found.judged)]
     assert (len(numbers[0]), len(numbers[1])) == halves
     assert not {*numbers[0]} & {*numbers[1]}
-    assert found.first_judged == FIRST_CHOSEN
+    assert (found.converged, found.first_judged) == (True, FIRST_CHOSEN)
+    claims = ((asked[0].metrics[0], at_most(1.0)),)
+    found = target("t.py::test_it", "cpu_cost", None, None, 9, asked=(asked[0], claims))
+    assert (found.claims, found.metric, found.first_judged) == (claims, None, FIRST_CHOSEN)
     moved = replace(asked[0], moved=0.001), ()
     found = target("t.py::test_it", "cpu_cost", "converged:tilt", None, 9, asked=moved)
     assert (len(found.chosen), len(found.judged), found.first_judged) == (4, 9, FIRST_JUDGED)

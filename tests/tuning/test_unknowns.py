@@ -29,7 +29,7 @@ def test_each_unknown_changes_its_own_number_alone(name: str) -> None:
 
 
 def test_the_inertia_changes_with_the_mass() -> None:
-    after = changed(WHOLE, {"mass:block": 4.0, "mass:door": 3.0})
+    after = changed(WHOLE, {"mass:block": 4.0, "mass:door": 3.0, "linear_damping:block": 0.5})
     assert after.body("block").moments == pytest.approx((0.2, 0.4, 0.6))
     (door,) = [link for link in PreparedRobot(after.robot).links.values() if link.name == "door"]
     assert door.mass == pytest.approx(3.0)

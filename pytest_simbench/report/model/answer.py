@@ -111,6 +111,7 @@ def _compare(metric: Metric, summary: TaskSummary) -> str:
 
     ahead, behind, others = those("ahead"), those("behind"), those("same", "open", None)
     verb = "is" if len(ahead) == 1 else "are"
+    leads = f"{listed(ahead, NAMED)} {verb} ahead" if ahead else "none is ahead"  # three in a ring
     # "of" only where it is true of each: one row that beats every one that is behind.
     won = [d for d in told if d.winner is not None]
     beaten = {d.loser for d in won if d.winner in found.who("ahead")}
@@ -118,7 +119,7 @@ def _compare(metric: Metric, summary: TaskSummary) -> str:
     over = f" of {listed(behind, NAMED)}" if of_each else f"; behind: {listed(behind, NAMED)}"
     by = f", by {_amount(won[0])}" if len(won) == 1 else ""
     rest = f"; not told apart: {listed(others, NAMED)}" if others else ""
-    return f"{metric.title}: {listed(ahead, NAMED)} {verb} ahead{over}{by}{rest}."
+    return f"{metric.title}: {leads}{over}{by}{rest}."
 
 
 def _values(metric: Metric, summary: TaskSummary) -> Mapping[int, str]:

@@ -103,6 +103,10 @@ def test_who_is_ahead_colours_the_cells() -> None:
         (("c>a", "b>a"), "c 90 % [80, 100] and b 80 % [70, 90] are ahead; behind: a 20 % [10, 30]"),
         (("c>a", "b>a", "c>b"), "c 90 % [80, 100] is ahead of b 80 % [70, 90] and a 20 % [10, 30]"),
         (("c>b", "b>a"), "c 90 % [80, 100] is ahead; behind: b 80 % [70, 90] and a 20 % [10, 30]"),
+        (
+            ("a>b", "b>c", "c>a"),
+            "none is ahead; behind: c 90 % [80, 100], b 80 % [70, 90] and a 20 % [10, 30]",
+        ),
         ((), "c 90 % [80, 100], b 80 % [70, 90] and a 20 % [10, 30]; not told apart"),
         (
             ("a~b", "a~c", "b~c"),

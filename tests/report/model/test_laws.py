@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.measure.sweep import Swept, sweeps
-from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.phenomena import PHENOMENON
@@ -21,10 +20,8 @@ from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import TaskSummary, at_own_steps, summarise
 from pytest_simbench.report.page.context import page
 from pytest_simbench.report.page.render import render
-from pytest_simbench.report.terminal.parts import render_histories, sweep_lines
 from pytest_simbench.report.terminal.run import render_brief, render_run
-from tests.measure.test_law_history import asked, row
-from tests.report.samples import METRICS, failed, record, stacking_run, text, texts
+from tests.report.samples import METRICS, failed, record, stacking_run, texts
 
 ERROR = (Metric("error", "error", "m", "lower", least=0), Metric("ratio", "ratio", "", "lower"))
 LAWS = {"sag": "joints", "creep": "sticking", "stick": "sticking", "fall": "free motion"}
@@ -161,21 +158,6 @@ def test_profiles_of_a_sweep_are_told_apart() -> None:
     assert names == ["mujoco (default)", "mujoco (tuned)"]
 
 
-def test_the_terminal_tells_the_table_and_what_failed() -> None:
-    short, whole = ("\n".join(sweep_lines(swept(), 80, verbose)) for verbose in (False, True))
-    assert whole.startswith(short)
-    assert short.startswith(text(
-        """
-        simulator    free motion
-        ------------------------
-        mujoco     1/1 1ms 0.010
-        ode                  0/1
-        """
-    ))  # fmt: skip
-    assert "ode fails fall at 2ms: it left the room" in short
-    assert "order of convergence" in whole.removeprefix(short)
-
-
 def test_laws_at_other_steps_are_in_no_other_table_and_other_tasks_are() -> None:
     stacking = record(settings={"timestep": 0.5}, notes=Notes(own_timestep=0.001))
     kept = [(r.simulator, r.settings["timestep"]) for r in at_own_steps([*SWEPT, stacking])]
@@ -196,18 +178,3 @@ def test_markdown_and_page_hold_them(tmp_path: Path, records: list[Record]) -> N
     own = [r for r in SWEPT if not r.swept]
     assert swept(own) == []
     assert 'id="steps"' not in render(page(tmp_path, Report(summaries(own), own)))
-
-
-def test_releases_are_told_in_lines_and_in_markdown() -> None:
-    records = [
-        *row("fall", 0.2, 0.2, 0.2, 0.2, phenomenon="free motion"),
-        *row("tower", 0.1, 0.1, None, 0.1),
-        *asked("glide", "2.0", 50.0),
-    ]
-    found = Report.of(RunContents(records=tuple(records))).histories
-    assert render_histories(found, 60).splitlines()[:2] == [
-        "engine, 3 laws (headless tuned), 4 releases, 1.2 to 2.0:",
-        "  1.10: tower fails (0.1x before): WorkerHung: no answer",
-    ]
-    written = markdown(Report(summaries(run()), histories=found))
-    assert "## History: engine, 3 laws (headless tuned)\n\n- 1.10: tower fails" in written

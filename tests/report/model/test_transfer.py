@@ -11,9 +11,6 @@ from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.report.figures.drawing import drawing
-from pytest_simbench.report.figures.transfer import CAPTION, draw
-from pytest_simbench.report.files import write_files
 from pytest_simbench.report.markdown.run import render_run as markdown
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.transfer import section
@@ -106,18 +103,6 @@ def test_terminal_markdown_and_page_tell_it_first(four: Report, tmp_path: Path) 
     shown = render(page(tmp_path, four))
     assert f'<p class="answer">{answer[2]}</p>' in shown
     assert shown.index('id="transfer"') < shown.index('id="task-1"')
-
-
-def test_the_picture(four: Report, tmp_path: Path) -> None:
-    with drawing():
-        (axis,) = draw(four.transfers[0]).axes
-        drawn = [text.get_text() for text in axis.texts]
-    assert drawn[:4] == ["1.00\n[1.00, 1.00]"] * 2 + ["-1.00\n[-1.00, -1.00]", "-"]
-    assert write_files(tmp_path, four).problems == []
-    assert (tmp_path / "transfer_pushing.png").exists()
-    shown = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert CAPTION in shown
-    assert "<image" not in shown
 
 
 def test_without_policies_there_is_none(tmp_path: Path) -> None:
