@@ -16,6 +16,8 @@ from pytest_simbench.tasks import Jitter, Settling, rests_on
 from pytest_simbench.tasks.resting import spread
 from pytest_simbench.tasks.settling import deepest, kinetic_energy, tilted
 from tests.conftest import performed
+from tests.tasks.scripted import Mishap, move, perform
+from tests.tasks.scripted_scene import ROBOT, Moved
 
 NONE = Jitter(0.0, 0.0)
 FRAME = Pose((0.0, 0.0, -0.05), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
@@ -109,6 +111,39 @@ def test_the_spread_of_forces_is_of_the_weight() -> None:
     assert spread(scene, looks) == pytest.approx(5.0)
     assert spread(scene, [{}, {pair: np.array([0, 0, 2.0, 0, 0, 0])}]) == pytest.approx(5.0)
     assert spread(scene, []) is None
+
+
+class Restless(Moved):
+    """Its slab slides at 30 mm/s, pressed by 19 N and 21 N in turns."""
+
+    def do_contact_forces(self) -> list[Any]:
+        self.velocities["slab"][0] = 0.03
+        return [("body/slab", "ground", np.array([0, 0, 20 + (-1) ** len(self.asked), 0, 0, 0]))]
+
+
+def test_the_whole_score_of_what_ends_elsewhere() -> None:
+    """The slab goes 30 mm aside and 4 mm down, the stool leans 6 mm beside it, the door opens.
+    8 in 9 of the samples at rest have the speed, and one body of two."""
+    scene = replace(SCENE, robot=ROBOT, gravity=(0.0, 0.0, -10.0))
+    asked = {"tilt": 30.0}, {}, {"tilt": 30.0, "within": 0.005}
+    premises = [rests_on("stool", "slab", **how) for how in asked]
+    task = Settling(scene, [*premises, rests_on("slab", "stool", within=0.1)], seconds=2.0)
+    shove, tip = move("slab", y=0.03, z=-0.004), move("stool", tilt=0.5)
+    script = Mishap("settle", 1.4, shove), Mishap("rest", 0.0, tip)
+    outcome, process = perform(task, *script, process=Restless((0.1, 0.05)))
+    assert outcome.metrics == pytest.approx({
+        "farthest": np.hypot(30.0, 4.0), "tilt": np.degrees(0.5), "sunk": 4.0, "restless": 20.0,
+        "energy": 400.0, "force_jitter": 100 / 15, "premises": 0.25,
+    })  # fmt: skip
+    assert outcome.reasons == tuple(f"not: {premise}" for premise in task.premises[1:])
+    stool = STOOL.pose * Pose(quaternion=(np.cos(0.25), np.sin(0.25), 0.0, 0.0)) * FRAME
+    way = 1000 * np.linalg.norm(np.subtract(stool.position, (STOOL.pose * FRAME).position))
+    ways, tilts = {"slab": 30.2655, "stool": round(way, 4)}, {"slab": 0.0, "stool": 28.6479}
+    assert outcome.details["ways"] == {**ways, "door": 0.0, "drawer": 0.0}
+    assert outcome.details["tilts"] == {**tilts, "door": 5.7296, "drawer": 0.0}
+    assert outcome.details["places"]["stool"] == pytest.approx(stool.as_array())
+    assert outcome.details["places"]["drawer"] == [0.05, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    assert [a.phase for a in process.asked if a.began >= 1.75] == ["rest"] * 10
 
 
 @pytest.mark.engine
