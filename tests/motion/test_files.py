@@ -327,6 +327,10 @@ IN_URDF = {
         ),
         r"joint 'right_finger' follows 'left_finger' .* turn the finger's axis",
     ),
+    "a finger that moves ahead": (
+        swap('child link="right"/>', 'child link="right"/><mimic joint="left_finger" offset="1"/>'),
+        r"joint 'right_finger' follows 'left_finger' .* multiplier 1 and offset 0",
+    ),
     "a mimic loop": (
         lambda text: text.replace("</joint>", LOOP.replace("right", "left"), 5).replace(
             '<mimic joint="left_finger"/>', "", 3
