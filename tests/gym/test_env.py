@@ -234,8 +234,7 @@ def test_what_an_action_commands_and_a_place_is_worth() -> None:
     shapes = {name: box.shape for name, box in env.observation_space.items()}
     assert shapes == {"observation": (51,), "achieved_goal": (3,), "desired_goal": (3,)}
     assert env._jitter == Jitter(0.0005, np.radians(0.5))
-    action = checked([2.0, 0.0, -2.0, 0.5, 0.5], env.action_space)
-    found = env._command(action)
+    found = env._command(checked([2.0, 0.0, -2.0, 0.5, 0.5], env.action_space))
     assert found.tool_change == pytest.approx((0.05, 0.0, -0.05, 0.0, 0.0, 0.075))
     assert (found.gripper, found.position) == (pytest.approx(0.75 * 0.07), None)
     assert env.compute_reward(places, goal, {}).tolist() == [0.0, -1.0]

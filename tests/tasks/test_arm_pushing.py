@@ -77,7 +77,9 @@ def test_each_metric_is_of_its_axis_and_turns_are_within_half_a_turn() -> None:
 
     def way(x: float, y: float, turn: float, rows: int = 101) -> FloatArray:
         shares = np.minimum(np.linspace(0.0, 100.0 / 101 * rows, rows) / 50.0, 1.0)
-        poses = (Pose.at(0.4 + s * x, 0.2 + s * y, 0.02, yaw=np.radians(170 + s * turn)) for s in shares)
+        poses = (
+            Pose.at(0.4 + s * x, 0.2 + s * y, 0.02, yaw=np.radians(170 + s * turn)) for s in shares
+        )
         return np.array([pose.as_array() for pose in poses])
 
     metrics, details = compared(way(0.08, 0.05, -10.0), way(0.1, 0.0, 30.0))
