@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.records.metrics import Metric
 from pytest_simbench.tasks import Jitter, LeaningTowers
 from pytest_simbench.tasks.base import CUBE_MASS, CUBE_SIZE
 from tests.tasks.scripted import Mishap, move, perform
@@ -84,13 +83,3 @@ def test_the_towers_as_they_are_built() -> None:
     colours = [body.colour for body in scene.bodies]
     assert colours == [colours[0], colours[1], colours[0]] * 2
     assert colours[0] != colours[1]
-
-
-def test_it_says_what_it_measures() -> None:
-    assert LeaningTowers() == LeaningTowers((0.008, 0.010, 0.012), 4, 3.0)
-    assert (LeaningTowers.name, LeaningTowers.study_timeout) == ("leaning towers", 60.0)
-    assert LeaningTowers(settle=2.5).metrics == (
-        Metric("standing", "standing", kind="share", of=12,
-               doc="cubes within 1 cm of their start 2.5 s later"),
-        Metric("towers", "towers", kind="share", of=3, doc="towers all of whose cubes stand"),
-    )  # fmt: skip
