@@ -47,12 +47,12 @@ def test_the_error_is_held_against_the_log_at_each_sample() -> None:
 
 
 def test_the_error_is_held_against_what_was_measured_where_commands_are_known() -> None:
-    seen = {"time": np.array([0.0, 1.0]), "hinge": np.array([0.25, 0.25])}
+    seen = {"time": np.array([0.0, 1.0]), "hinge": np.array([0.0, 0.5])}
     end = Start(("box",), (Pose.at(1.0, 0.04, 0.05, yaw=0.2),))
     task = Replaying(BESIDE, replace(log_of(["hinge"]), told=["hinge"], seen=seen, end=end))
     metrics = perform(task, process=Moved(end=(0.0, 0.0)))[0].metrics
-    told = dict.fromkeys(("error_hinges", "worst_hinges"), math.degrees(0.25))
-    assert metrics == pytest.approx({**told, "off": 40.0, "turned": math.degrees(0.2)})
+    told = {"error_hinges": math.degrees(0.5 / math.sqrt(3)), "worst_hinges": math.degrees(0.5)}
+    assert metrics == pytest.approx({**told, "off": 40, "turned": math.degrees(0.2)}, rel=0.01)
 
 
 def test_joints_that_the_log_does_not_name_are_not_measured() -> None:
