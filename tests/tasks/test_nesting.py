@@ -8,7 +8,7 @@ import pytest
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.scene import Pose
 from pytest_simbench.scene.penetration import penetration
-from pytest_simbench.tasks import Jitter, Nesting
+from pytest_simbench.tasks import Nesting
 from pytest_simbench.tasks.nesting import FLOOR, FRICTION, HEIGHT, LEAN, STEP, THICK, a_bowl
 from tests.conftest import performed
 from tests.tasks.scripted import Mishap, move, perform
@@ -70,8 +70,3 @@ def test_on_an_engine(case: Case) -> None:
     record = performed(case, Nesting().smoke())
     assert record.metrics["height_error"] < 0.1
     assert record.metrics["tilt"] < 0.1
-
-
-def test_the_bowls_start_above_each_other() -> None:
-    heights = [body.pose.position[2] for body in Nesting(3).scene(1, Jitter(0.0, 0.0)).free_bodies]
-    assert np.diff(heights) == pytest.approx([STEP + 0.005] * 2)
