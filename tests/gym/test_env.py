@@ -228,7 +228,7 @@ def test_several_at_once_are_as_one_after_the_other() -> None:
 
 
 def test_what_an_action_commands_and_a_place_is_worth() -> None:
-    """In a tenth of a second; none of it needs a worker."""
+    """In a tenth of a second, and in a twentieth; none of it needs a worker."""
     places, goal = [[0.02, 0.0, 0.0], [0.0, 0.021, 0.0]], np.zeros(3)
     env = make("pushing", "mujoco", jitter=0.5, reward="sparse", robot=panda())
     shapes = {name: box.shape for name, box in env.observation_space.items()}
@@ -238,11 +238,15 @@ def test_what_an_action_commands_and_a_place_is_worth() -> None:
     assert found.tool_change == pytest.approx((0.05, 0.0, -0.05, 0.0, 0.0, 0.075))
     assert (found.gripper, found.position) == (pytest.approx(0.75 * 0.07), None)
     assert env.compute_reward(places, goal, {}).tolist() == [0.0, -1.0]
-    env = make("reaching", "mujoco", actions="joints", seconds=1.0)
+    assert (env._handle.case.mode, env._handle.case.profile) == ("headless", "tuned")
+    assert env.metadata == {"render_modes": ["rgb_array"], "render_fps": 10.0}
+    delays = {"command_latency": 0.05, "observation_delay": 0.1}
+    env = make("reaching", "mujoco", actions="joints", seconds=1.0, rate=20.0, **delays)
+    assert (env._jitter, env.rhythm) == (Jitter(), Rhythm(20.0, 0.05, 0.1))
     assert env.compute_reward(places, goal, {}).tolist() == [-0.02, -0.021]
     env._position = np.array([0.0, 1.75, *panda().column("initial_position")[2:]])
     found = env._command(checked([-1.0, 1.0, *np.zeros(5), -1.0], env.action_space))
-    assert found.position[:3] == pytest.approx([-0.1, 1.7628, 0.0])  # the end of its range
+    assert found.position[:3] == pytest.approx([-0.05, 1.7628, 0.0])  # the end of its range
     assert (found.gripper, found.tool_change) == (0.0, None)
 
 
