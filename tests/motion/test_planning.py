@@ -233,3 +233,7 @@ def test_along_a_curved_path() -> None:
     assert [rows.tolist() for rows in along_path(path[[3, 3]], LIMITS)] == [
         [path[3].tolist()], [[0.0] * 7], [[0.0] * 7],
     ]  # fmt: skip
+    rng = np.random.default_rng(271)  # uneven ways, between which the spline swings out
+    uneven = np.cumsum(10 ** rng.uniform(-4, 0, (7, 1)) * rng.normal(size=(7, 7)), axis=0)
+    check(timed := along_path(uneven, LIMITS))
+    assert timed.duration == pytest.approx(4.392, abs=TICK)
