@@ -231,8 +231,7 @@ def test_what_an_action_commands_and_a_place_is_worth() -> None:
     """In a tenth of a second, and in a twentieth; none of it needs a worker."""
     places, goal = [[0.02, 0.0, 0.0], [0.0, 0.021, 0.0]], np.zeros(3)
     env = make("pushing", "mujoco", jitter=0.5, reward="sparse", robot=panda())
-    shapes = {name: box.shape for name, box in env.observation_space.items()}
-    assert shapes == {"observation": (51,), "achieved_goal": (3,), "desired_goal": (3,)}
+    assert [box.shape for _, box in sorted(env.observation_space.items())] == [(3,), (3,), (51,)]
     assert env._jitter == Jitter(0.0005, np.radians(0.5))
     found = env._command(checked([2.0, 0.0, -2.0, 0.5, 0.5], env.action_space))
     assert found.tool_change == pytest.approx((0.05, 0.0, -0.05, 0.0, 0.0, 0.075))

@@ -117,7 +117,9 @@ def test_a_record_tells_which_policy_it_was() -> None:
     def open_loop(gain: float, seen: Observation) -> float:
         return gain
 
-    for bound in (  # functions with an argument, and methods
+    called = type("Called", (Held,), {"act": None, "__call__": Held.act})
+    for bound in (  # functions with an argument, methods, and objects that are called
+        lambda gain: as_policy(called(gain)),
         lambda gain: as_policy(partial(open_loop, gain)),
         lambda gain: as_policy(partial(partial(open_loop), gain=gain)),
         lambda gain: as_policy(Held(gain).act),
