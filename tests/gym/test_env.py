@@ -239,6 +239,7 @@ def test_what_an_action_commands_and_a_place_is_worth() -> None:
     assert env.compute_reward(places, goal, {}).tolist() == [0.0, -1.0]
     assert (env._handle.case.mode, env._handle.case.profile) == ("headless", "tuned")
     assert env.metadata == {"render_modes": ["rgb_array"], "render_fps": 10.0}
+    assert make_vec("pushing", "mujoco", 2).num_envs == 2
     delays = {"command_latency": 0.05, "observation_delay": 0.1}
     env = make("reaching", "mujoco", actions="joints", seconds=1.0, rate=20.0, **delays)
     assert (env._jitter, env.rhythm) == (Jitter(), Rhythm(20.0, 0.05, 0.1))
