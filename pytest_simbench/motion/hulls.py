@@ -52,7 +52,7 @@ def with_hulls(
                 continue
             at = list(link).index(collision)
             link.remove(collision)
-            triangles = read_stl(kept["meshes"][mesh.get("filename", "")])
+            triangles = read_stl(kept["meshes"][mesh.attrib["filename"]])
             for points in _slices(triangles, collision, cut):
                 points = points[ConvexHull(points).vertices]
                 hull = stl(points[extreme(points, corners)])
@@ -88,8 +88,6 @@ def _slices(triangles: FloatArray, collision: ET.Element, cut: Cuts | None) -> I
 def _crossings(edges: FloatArray, heights: FloatArray, plane: float) -> FloatArray:
     """Where edges, (n, 2, 3), with ends at some heights, (n, 2), cross a plane, (m, 3)."""
     crossing = (heights.min(axis=1) < plane) & (plane < heights.max(axis=1))
-    if not np.isfinite(plane) or not crossing.any():
-        return np.empty((0, 3))
     (a, b), (low, high) = edges[crossing].transpose(1, 0, 2), heights[crossing].T
     share = ((plane - low) / (high - low))[:, None]
     return np.asarray(a + share * (b - a))

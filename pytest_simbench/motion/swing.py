@@ -121,8 +121,6 @@ def _candidates(
         turned = plane @ tool.rotation @ model.tool_jacobian(joints)[:3, moving]
         for elevation in ELEVATIONS:
             speed = _speed(distance, height - LANDING_HEIGHT * scale, elevation, gravity)
-            if speed is None:
-                continue
             flight = plane.T @ [np.cos(elevation), np.sin(elevation)]
             if flight @ tool.rotation[:, 2] < OUTWARDS:
                 continue
@@ -187,12 +185,10 @@ def _easiest(jacobian: FloatArray, velocity: FloatArray, limits: FloatArray) -> 
     return np.full(n, np.inf) if found.x is None else np.asarray(found.x[:n] * limits)
 
 
-def _speed(away: float, drop: float, elevation: float, gravity: FloatArray) -> float | None:
+def _speed(away: float, drop: float, elevation: float, gravity: FloatArray) -> float:
     """Of a flight that goes so far and drops so deep: drop = g t^2 / 2 - v sin(e) t,
     away = v cos(e) t [m/s]."""
     g, rise = -float(gravity[2]), away * np.tan(elevation)
-    if away <= 0 or drop + rise <= 0:
-        return None
     return float(away / np.cos(elevation) / np.sqrt(2 * (drop + rise) / g))
 
 

@@ -29,9 +29,9 @@ class FileTable:
             raise self.error(key, "make it a table, with its values below " + f"[{key}]")
         return FileTable(value, f"{self.where}, [{key}]")
 
-    def text(self, key: str, default: str | None = None) -> str:
+    def text(self, key: str) -> str:
         """A text that is not empty."""
-        value = self._take(key, default)
+        value = self._take(key)
         if not isinstance(value, str) or not value.strip() or "\0" in value:
             raise self.error(key, "give it a text")
         return value

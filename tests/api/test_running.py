@@ -78,7 +78,9 @@ def test_records_are_those_of_a_pytest_run(scripted: dict[str, Any]) -> None:
 
 
 def test_how_often_is_as_in_pytest(scripted: dict[str, Any]) -> None:
-    assert len(simbench.run(Falling(), "mujoco").contents.records) == 20
+    fast = simbench.run(Falling(), "mujoco").contents.records
+    assert {(r.jitter, r.mode, r.profile) for r in fast} == {(1.0, "headless", "tuned")}
+    assert [r.seed for r in fast] == list(range(10001, 10021))
     assert len(simbench.run(Falling(), "mujoco", protocol="smoke").contents.records) == 1
 
 

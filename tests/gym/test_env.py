@@ -25,7 +25,9 @@ from pytest_simbench.cli.values import BadInput
 from pytest_simbench.client.environments import missing
 from pytest_simbench.client.errors import Unavailable
 from pytest_simbench.gym import IDS, making
+from pytest_simbench.gym.env import checked
 from pytest_simbench.gym.making import RATE, make, make_vec
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Scene
 from pytest_simbench.scene.policy import Rhythm
 from pytest_simbench.simulator import Capability
@@ -114,8 +116,6 @@ def test_an_episode_ends_once_the_goal_is_held(reward: str) -> None:
         assert [one["is_success"] for one in infos[-6:]] == [True] * 6  # 0.5 s
         assert -0.02 <= rewards[-1] <= 0.0
         assert rewards[0] == (-1.0 if reward == "sparse" else -infos[1]["distance"])
-        many = env.compute_reward(np.zeros((4, 3)), np.eye(4)[:, :3], {})
-        assert many.tolist() == ([-1.0, -1.0, -1.0, 0.0] if reward == "sparse" else [-1, -1, -1, 0])
         with pytest.raises(ResetNeeded):
             env.step(np.zeros(5))
 
@@ -225,6 +225,29 @@ def test_several_at_once_are_as_one_after_the_other() -> None:
                     np.testing.assert_array_equal(many[0][name][k], row)
                 if many is not steps[0]:
                     assert [told[k] for told in many[1:4]] == list(one[1:4])
+
+
+def test_what_an_action_commands_and_a_place_is_worth() -> None:
+    """In a tenth of a second, and in a twentieth; none of it needs a worker."""
+    places, goal = [[0.02, 0.0, 0.0], [0.0, 0.021, 0.0]], np.zeros(3)
+    env = make("pushing", "mujoco", jitter=0.5, reward="sparse", robot=panda())
+    assert [box.shape for _, box in sorted(env.observation_space.items())] == [(3,), (3,), (51,)]
+    assert env._jitter == Jitter(0.0005, np.radians(0.5))
+    found = env._command(checked([2.0, 0.0, -2.0, 0.5, 0.5], env.action_space))
+    assert found.tool_change == pytest.approx((0.05, 0.0, -0.05, 0.0, 0.0, 0.075))
+    assert (found.gripper, found.position) == (pytest.approx(0.75 * 0.07), None)
+    assert env.compute_reward(places, goal, {}).tolist() == [0.0, -1.0]
+    assert (env._handle.case.mode, env._handle.case.profile) == ("headless", "tuned")
+    assert env.metadata == {"render_modes": ["rgb_array"], "render_fps": 10.0}
+    assert make_vec("pushing", "mujoco", 2).num_envs == 2
+    delays = {"command_latency": 0.05, "observation_delay": 0.1}
+    env = make("reaching", "mujoco", actions="joints", seconds=1.0, rate=20.0, **delays)
+    assert (env._jitter, env.rhythm) == (Jitter(), Rhythm(20.0, 0.05, 0.1))
+    assert env.compute_reward(places, goal, {}).tolist() == [-0.02, -0.021]
+    env._position = np.array([0.0, 1.75, *panda().column("initial_position")[2:]])
+    found = env._command(checked([-1.0, 1.0, *np.zeros(5), -1.0], env.action_space))
+    assert found.position[:3] == pytest.approx([-0.05, 1.7628, 0.0])  # the end of its range
+    assert (found.gripper, found.tool_change) == (0.0, None)
 
 
 @pytest.mark.parametrize(

@@ -210,7 +210,14 @@ IN_TOML = {
         r"\[arm\]: joints is missing",
     ),
     "no hand": (lambda text: text[: text.index("[hand]")], r"\[hand\]: tool_frame is missing"),
-    "a number for a table": (swap("[hand]", "[hand_of_it]"), r"\[hand\]: tool_frame is missing"),
+    "a number for a table": (
+        lambda text: f"hand = 3\n{text[: text.index('[hand]')]}",
+        r"small\.toml: hand: make it a table, with its values below \[hand\]$",
+    ),
+    "a blank name": (swap('"small"', '" "'), r"small\.toml: name: give it a text$"),
+    "a name for a list": (swap('["turn", "lift", "bend"]', '"turn"'), r"joints: give it a list of"),
+    "numbers for names": (swap('"bend"]', "3]"), r"\[arm\]: joints: give it a list of names"),
+    "a number too large": (swap("8.0", "2e12"), r"acceleration: 2000000000000.0 is no number of"),
     "no URDF": (swap("small.urdf", "other.urdf"), r"cannot read the robot .*other\.urdf: No such"),
     "an unknown package": (
         swap("small.urdf", "package://mine/small.urdf"),
@@ -326,6 +333,10 @@ IN_URDF = {
             'child link="right"/><mimic joint="left_finger" multiplier="-1"/>',
         ),
         r"joint 'right_finger' follows 'left_finger' .* turn the finger's axis",
+    ),
+    "a finger that moves ahead": (
+        swap('child link="right"/>', 'child link="right"/><mimic joint="left_finger" offset="1"/>'),
+        r"joint 'right_finger' follows 'left_finger' .* multiplier 1 and offset 0",
     ),
     "a mimic loop": (
         lambda text: text.replace("</joint>", LOOP.replace("right", "left"), 5).replace(

@@ -219,6 +219,21 @@ def test_half_speed_takes_twice_as_long() -> None:
 def test_along_a_curved_path() -> None:
     s = np.linspace(0.0, 1.0, 20)[:, None]
     path = 0.5 * np.hstack([np.sin(s * k) for k in range(1, 8)])
-    timed = along_path(path, LIMITS)
+    timed, slow, same = (
+        along_path(rows, LIMITS, speed=speed)
+        for rows, speed in ((path, 1.0), (path, 0.5), (np.repeat(path, 2, axis=0), 1.0))
+    )
     check(timed)
-    assert np.allclose(timed.position[-1], path[-1], atol=1e-6)
+    assert timed.duration == pytest.approx(3.272, abs=TICK)  # plans stay what they were
+    assert slow.duration == pytest.approx(2 * timed.duration, abs=2 * TICK)
+    assert np.array_equal(same.position, timed.position)  # a point twice changes nothing
+    assert np.allclose(timed.position[[0, -1]], path[[0, -1]], atol=1e-6)
+    away = np.linalg.norm(timed.position[:, None] - path, axis=2).min(axis=0)
+    assert away.max() < 0.02  # it goes through all points
+    assert [rows.tolist() for rows in along_path(path[[3, 3]], LIMITS)] == [
+        [path[3].tolist()], [[0.0] * 7], [[0.0] * 7],
+    ]  # fmt: skip
+    rng = np.random.default_rng(271)  # uneven ways, between which the spline swings out
+    uneven = np.cumsum(10 ** rng.uniform(-4, 0, (7, 1)) * rng.normal(size=(7, 7)), axis=0)
+    check(timed := along_path(uneven, LIMITS))
+    assert timed.duration == pytest.approx(4.392, abs=TICK)

@@ -75,11 +75,6 @@ def test_a_broken_one_is_a_sentence(name: str, message: str) -> None:
         registry.find(name)
 
 
-@pytest.mark.parametrize("name", ["panda", "ur5", "ur10", "xarm7"])
-def test_arms_of_full_reach_have_the_studys_scene(name: str) -> None:
-    assert scale_of(find(name)) == grasping_scale_of(find(name)) == 1.0
-
-
 def test_the_so101_has_a_smaller_one() -> None:
     robot = find("so101")
     assert (scale_of(robot), grasping_scale_of(robot)) == (0.5, 0.4)

@@ -88,14 +88,6 @@ def test_other_steps_make_no_gap(step: float) -> None:
     assert len(between.time) >= 0.5 / 0.002 - step / 0.002
 
 
-def test_where_they_part() -> None:
-    second = circling(0.02)
-    second[2].bodies[10:, 0, 1] += 0.005
-    between = gaps(circling(0.02), second)
-    assert between.first_beyond(0.001) == (1 + 25 + 10, 0)
-    assert between.first_beyond(0.01) is None
-
-
 def test_where_an_episode_ends_or_changes_its_cubes() -> None:
     """Told by the time of the last sample that both have."""
     long, short = circling(0.1, (0.5, 0.7, 0.2)), circling(0.1, (0.5, 0.7))

@@ -77,16 +77,19 @@ def test_each_metric_is_of_its_axis_and_turns_are_within_half_a_turn() -> None:
 
     def way(x: float, y: float, turn: float, rows: int = 101) -> FloatArray:
         shares = np.minimum(np.linspace(0.0, 100.0 / 101 * rows, rows) / 50.0, 1.0)
-        poses = (Pose.at(s * x, 0.2 + s * y, 0.02, yaw=np.radians(170 + s * turn)) for s in shares)
+        poses = (
+            Pose.at(0.4 + s * x, 0.2 + s * y, 0.02, yaw=np.radians(170 + s * turn)) for s in shares
+        )
         return np.array([pose.as_array() for pose in poses])
 
     metrics, details = compared(way(0.08, 0.05, -10.0), way(0.1, 0.0, 30.0))
     assert metrics["displacement"] == pytest.approx(0.08)
     assert metrics["displacement_error"] == pytest.approx(0.02)
     assert metrics["turn_error"] == pytest.approx(40.0)
-    assert (details["turn"], details["real_turn"]) == pytest.approx((-10.0, 30.0))
+    delay = details.pop("delay")  # 0.05 m on a way of 0.08 and of 0.1 m, in half a second
+    assert delay == pytest.approx(0.5 * (0.05 / 0.08 - 0.05 / 0.1), abs=0.01)
+    assert details == pytest.approx({"turn": -10.0, "real_turn": 30.0, "real_displacement": 0.1})
     share = (50 / 2 + 51) / 101  # on the way, and at its end
     assert metrics["way_error"] == pytest.approx(share * np.hypot(0.02, 0.05), rel=0.01)
-    assert details["delay"] > 0
     turned = compared(way(0.1, 0.0, 175.0), way(0.1, 0.0, -175.0, rows=90))[0]
     assert turned["turn_error"] == pytest.approx(10.0)

@@ -31,10 +31,15 @@ def test_a_perfect_hand_has_no_error() -> None:
 
 
 def test_what_slips_and_what_creeps_are_told_apart() -> None:
-    outcome, _ = carried(Mishap("shake", 0.5, slip(z=-0.003)), Mishap("hold", 0.2, slip(z=-0.002)))
+    slips = Mishap("shake", 0.5, slip(z=-0.003)), Mishap("hold", 0.2, slip(z=-0.002))
+    outcome, process = carried(*slips)
     assert outcome.metrics["slip"] == pytest.approx(3.0, abs=1e-3)
     assert outcome.metrics["creep"] == pytest.approx(2.0 * 60, abs=0.1)
-    fallen, _ = carried(Mishap("carry", 0.5, slip(z=-0.05)))
+    looks = np.array(outcome.details["in_hand"])
+    assert np.diff(looks[:, 2]) == pytest.approx([-0.003, -0.002], abs=1e-6)
+    assert (process.counts, [*process.marks]) == ([(1, 1)], ["start", "end"])
+    fallen, process = carried(Mishap("carry", 0.5, slip(z=-0.05)))
+    assert process.counts == [(0, 1)]
     assert fallen.metrics == {"held": 0.0}
     assert fallen.reasons == ("thing is not in the hand",)
 

@@ -22,9 +22,10 @@ def test_joints_are_held_against_the_log_at_its_own_times() -> None:
     seen = {"time": TIME, "slider": np.array([0.05, 0.1, 0.2])}
     log = Log(Trajectory(1.0, ROWS, ROWS, ROWS), ["slider"], Start((), ()), Start((), ()), "", seen)
     task = Fitting(SCENE, log, {"spring:slider": 3.0})
-    outcome, _ = perform(task, process=Moved(end=(0.0, 0.05)))
-    assert outcome.details["residuals"] == {"slider": [[0.0], [-0.05], [-0.15]]}
-    assert outcome.metrics == {"off": pytest.approx(1000 * math.sqrt((0.05**2 + 0.15**2) / 3))}
+    outcome, _ = perform(task, process=Moved(end=(0.0, 0.05), speed=(0.0, 0.1)))
+    found = np.array(outcome.details["residuals"]["slider"])
+    assert found[:, 0] == pytest.approx([0.0, -0.05 - 0.065, -0.15])
+    assert outcome.metrics == {"off": pytest.approx(1000 * math.sqrt((0.115**2 + 0.15**2) / 3))}
     assert [metric.name for metric in task.metrics] == ["off"]
     assert task.parameters()["task.spring:slider"] == 3.0
 

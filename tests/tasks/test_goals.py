@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,10 @@ from pytest_simbench.motion.registry import known_robot
 from pytest_simbench.scene import Pose
 from pytest_simbench.scene.policy import Command, Observation, as_policy
 from pytest_simbench.tasks import GoalTask, Jitter, PickAndPlace, PushingToGoal, Reaching
+from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.goals import digest
 from tests.conftest import performed
+from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, put
 
 TASKS = (Reaching, PushingToGoal, PickAndPlace)
 
@@ -114,12 +117,40 @@ def test_a_record_tells_which_policy_it_was() -> None:
     def open_loop(gain: float, seen: Observation) -> float:
         return gain
 
-    for bound in (  # functions with an argument, and methods
+    called = type("Called", (Held,), {"act": None, "__call__": Held.act})
+    for bound in (  # functions with an argument, methods, and objects that are called
+        lambda gain: as_policy(called(gain)),
         lambda gain: as_policy(partial(open_loop, gain)),
         lambda gain: as_policy(partial(partial(open_loop), gain=gain)),
         lambda gain: as_policy(Held(gain).act),
     ):
         assert digest(bound(1.0)) == digest(bound(1.0)) != digest(bound(2.0))
+
+
+def test_what_a_policy_is_given_and_what_is_scored(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The policy acts for 1 s of 3. Then the cube comes to 20 mm from its place."""
+    task = PickAndPlace(limp, 3.0, rate=5.0, command_latency=0.1, observation_delay=0.2, settle=0.3)
+    given = {"rate": 5.0, "command_latency": 0.1, "observation_delay": 0.2, "at_most": 3.0}
+    goal, asked, counts = task.goal(4), {}, []
+    slips = Mishap("settle", 0.1, put("cube", goal.translated(0.02)))
+    world = ScriptedWorld(ScriptedProcess([slips]), task.scene(4, Jitter()))
+
+    def control(policy: Any, **how: Any) -> None:
+        asked.update(how, policy=policy)
+        world.wait(1.0)
+
+    monkeypatch.setattr(world, "control", control)
+    assert task.perform(world, 4, lambda *count: counts.append(count)) == Outcome(
+        {"success": 1.0, "distance": pytest.approx(0.02), "time": pytest.approx(0.5)},
+        {"goal": [*goal.position], "acted": pytest.approx(1.0)},
+    )
+    stays = asked.pop("until")
+    assert asked == {**given, "policy": limp, "seed": 4, "inside": False, "goal": goal}
+    marks = {"start": 0.2, "end": 1.2}
+    assert (counts, world.process.marks, world.time) == ([(1, 1)], marks, 1.5)
+    ways = (0.0, 0.0), (0.02, 0.49), (0.03, 0.6), (0.02, 0.7), (0.02, 1.1), (0.02, 1.2)
+    seen = [SimpleNamespace(time=t, pose=lambda _, x=x: goal.translated(x)) for x, t in ways]
+    assert [stays(one) for one in seen] == [False] * 5 + [True]
 
 
 @pytest.mark.engine

@@ -76,6 +76,8 @@ def test_joints_are_measured_by_kind_each_in_its_unit() -> None:
         "restless_hinges": "deg/s", "restless_sliders": "mm/s",
     }  # fmt: skip
     assert process.asked[0].arguments["position"].tolist() == [[0.0, 0.05]] * 2
+    gone, targets = {"hinge": 0.01, "slider": pytest.approx(-0.002)}, {"hinge": 0.0, "slider": 0.05}
+    assert outcome.details == {"gone": gone, "targets": targets, "places": {}}
 
 
 def test_without_joints_it_says_what_to_do() -> None:

@@ -11,9 +11,9 @@ from pytest_simbench.data import Impact, Impacts
 from pytest_simbench.data.impacts import MOMENT, SCALE, corner
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.records.record import Record
-from pytest_simbench.scene import FloatArray
+from pytest_simbench.scene import Box, FloatArray, Pose
 from pytest_simbench.tasks import Impacting, Jitter
-from pytest_simbench.tasks.impacting import AFTER, off
+from pytest_simbench.tasks.impacting import AFTER, GREY, off
 from tests.conftest import case_of, measured
 from tests.tasks.test_tossing import tossed
 
@@ -65,7 +65,9 @@ def test_the_scene_is_the_flight_before_the_impact() -> None:
     task = Impacting(MADE_UP, friction=0.2, restitution=0.6)
     scene = task.scene(2, Jitter())
     box, table = scene.bodies
-    top = table.pose.position[2] + 0.05
+    top, plate = 0.1, Box("table", (1.0, 1.0, 0.1), Pose.at(0, 0, 0.05), 0.0, 0.2, GREY)
+    assert table == replace(plate, restitution=0.6)
+    assert (box.friction, box.restitution, scene.name) == (0.2, 0.6, "impacting")
     assert (scene.ground_friction, scene.ground_restitution) == (0.2, 0.6)
     corners = np.array([[x, 0.0, z] for x in (-0.03, 0.03) for z in (-0.03, 0.03)])
     low = (corners @ box.pose.rotation().T)[:, 2].min() + box.pose.position[2]
@@ -73,6 +75,7 @@ def test_the_scene_is_the_flight_before_the_impact() -> None:
     assert box.pose.rotation() @ [1.0, 0.0, 0.0] == pytest.approx(  # x turns towards z
         [np.cos(task.real(2).flying(0.01)[0][2]), 0.0, np.sin(task.real(2).flying(0.01)[0][2])]
     )
+    assert box.linear_velocity == pytest.approx((-0.5, 0.0, -1.0 + 9.81 * 0.01), abs=0.01)
     assert box.angular_velocity == pytest.approx((0.0, -4.0, 0.0))
     assert box.inertia() / box.mass == pytest.approx(MOMENT)
 

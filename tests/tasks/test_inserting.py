@@ -68,7 +68,9 @@ def test_the_hole_is_as_wide_as_it_says(section: Section, clearance: float) -> N
 @pytest.mark.parametrize(("section", "depth"), [("square", 25), ("round", 25), ("square", 4)])
 def test_a_perfect_arm_inserts(section: Section, depth: float) -> None:
     """As deep as it is told, also where that is no whole number of steps."""
-    outcome = inserted(Inserting(section, 2e-3, depth / 1000))
+    task = Inserting(section, 2e-3, depth / 1000)
+    outcome = inserted(task)
+    assert (set(outcome.details["forces"]), outcome.details["added"]) == ({5.0}, 2 * task.facets)
     assert outcome.metrics == pytest.approx(
         {"inserted": 1.0, "depth": depth, "overlap": 0.0, "force": 5.0}, abs=1e-3
     )

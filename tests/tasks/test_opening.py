@@ -60,7 +60,10 @@ def opened(task: Opening = TASK, **how: float) -> Outcome:
 
 
 def test_a_perfect_hand_has_no_error() -> None:
-    found, right = opened().metrics, dict(TASK.references)
+    outcome, process = perform(TASK, jitter=Jitter(0.0, 0.0), process=PerfectHand())
+    found, right = outcome.metrics, dict(TASK.references)
+    assert (process.counts, [*process.marks]) == ([(1, 1)], ["start", "end"])
+    assert set(outcome.details["pulls"]) == {0.0, TASK.friction}
     assert set(found) == {metric.name for metric in TASK.metrics} == set(right)
     assert found["work"] == pytest.approx(1.0, abs=0.01)  # the first look sees no pull yet
     right.pop("work")

@@ -38,7 +38,7 @@ def test_what_leaks_and_what_misses_the_tray_is_counted() -> None:
         Mishap("settle", 0.1, put("ball_03", Pose.at(0, 0, 0.2))),
     )
     assert outcome.metrics == {"in_tray": 0.5, "leaked": 0.25}
-    assert process.counts == [(2, 4)]
+    assert (process.counts, [*process.marks]) == ([(2, 4)], ["start", "end"])
 
 
 def test_on_an_engine(case: Case) -> None:

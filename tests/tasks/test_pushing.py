@@ -112,7 +112,12 @@ def test_a_block_that_stays_is_a_whole_way_off() -> None:
     )
     outcome, _ = perform(LINE, jitter=EXACT, process=stays)
     assert outcome.metrics["position_error"] == pytest.approx(0.2)
-    assert stays.counts == [(0, 1)]
+    assert (stays.counts, [*stays.marks]) == ([(0, 1)], ["start", "end"])
+    assert [a.duration for a in stays.asked if a.kind == "wait"] == [0.2, LINE.settle]
+    assert outcome.details["end"] == [*START.position, *START.quaternion]
+    far, _ = perform(replace(LINE, length=2.0), jitter=EXACT, process=PushedProcess())
+    assert far.details["failed_push"].startswith("unreachable: path to ")
+    assert (far.metrics["position_error"], far.metrics["path_error"]) == (2.0, None)
     assert perform(LINE, jitter=EXACT, process=PushedProcess())[1].counts == [(1, 1)]
 
 

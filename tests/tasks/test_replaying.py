@@ -12,15 +12,16 @@ import pytest
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.scene_file import read_scene_file
 from pytest_simbench.recordings.logs import read_log
-from pytest_simbench.scene import Pose, SceneError, Start, Trajectory
+from pytest_simbench.scene import Box, Pose, SceneError, Start, Trajectory
 from pytest_simbench.tasks import Log, Replaying
 from pytest_simbench.tasks.replaying import turn
 from tests.conftest import case_of, performed
-from tests.tasks.scripted import perform
+from tests.tasks.scripted import Mishap, move, perform
 from tests.tasks.scripted_scene import SCENE, Moved
 from tests.tasks.test_holding import ARM
 
 NOTHING = Start((), ())
+BESIDE = replace(SCENE, bodies=(Box("box", (0.1,) * 3, Pose.at(1.0, 0.0, 0.05), 1.0),))
 
 
 def log_of(joints: list[str], columns: int = 2) -> Log:
@@ -32,26 +33,34 @@ def log_of(joints: list[str], columns: int = 2) -> Log:
 
 def test_the_error_is_held_against_the_log_at_each_sample() -> None:
     """Joints that stand at 0 while the log goes to 1: the root mean square of a ramp is 1 / √3."""
-    task = Replaying(SCENE, log_of(["hinge", "slider"]))
-    metrics = perform(task, process=Moved(end=(0.0, 0.0)))[0].metrics
+    task, shove = Replaying(BESIDE, log_of(["hinge", "slider"])), move("box", y=0.03)
+    outcome, _ = perform(task, Mishap("follow", 0.5, shove), process=Moved(end=(0.0, 0.0)))
+    metrics = outcome.metrics
     assert metrics == pytest.approx({
+        "farthest": 30.0,
         "error_hinges": math.degrees(1 / math.sqrt(3)), "worst_hinges": math.degrees(1.0),
         "error_sliders": 1000 / math.sqrt(3), "worst_sliders": 1000.0,
     }, rel=0.01)  # fmt: skip
     assert set(metrics) == {metric.name for metric in task.metrics}
+    places = {"box": [1.0, 0.03, 0.05, 1.0, 0.0, 0.0, 0.0]}
+    assert outcome.details == {"joints": {"hinge": 0.0, "slider": 0.0}, "places": places}
 
 
 def test_the_error_is_held_against_what_was_measured_where_commands_are_known() -> None:
-    seen = {"time": np.array([0.0, 1.0]), "hinge": np.array([0.25, 0.25])}
-    task = Replaying(SCENE, replace(log_of(["hinge"]), told=["hinge"], seen=seen))
+    seen = {"time": np.array([0.0, 1.0]), "hinge": np.array([0.0, 0.5])}
+    end = Start(("box",), (Pose.at(1.0, 0.04, 0.05, yaw=0.2),))
+    task = Replaying(BESIDE, replace(log_of(["hinge"]), told=["hinge"], seen=seen, end=end))
     metrics = perform(task, process=Moved(end=(0.0, 0.0)))[0].metrics
-    assert metrics["error_hinges"] == pytest.approx(math.degrees(0.25))
+    told = {"error_hinges": math.degrees(0.5 / math.sqrt(3)), "worst_hinges": math.degrees(0.5)}
+    assert metrics == pytest.approx({**told, "off": 40, "turned": math.degrees(0.2)}, rel=0.01)
 
 
 def test_joints_that_the_log_does_not_name_are_not_measured() -> None:
     task = Replaying(SCENE, log_of(["slider"]))
     assert [metric.name for metric in task.metrics] == ["error_sliders", "worst_sliders"]
-    assert task.parameters()["task.log"] == "digest"
+    told = {"task.log": "digest", "task.log_joints": ["slider"], "task.seconds": 1.0}
+    told |= {"task.scene_digest": task.parameters()["task.scene_digest"], "task.starts": 1}
+    assert task.parameters() == {**told, "task.scene": "two joints"}
 
 
 def test_a_log_of_another_scene_is_refused() -> None:

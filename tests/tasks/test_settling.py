@@ -16,6 +16,8 @@ from pytest_simbench.tasks import Jitter, Settling, rests_on
 from pytest_simbench.tasks.resting import spread
 from pytest_simbench.tasks.settling import deepest, kinetic_energy, tilted
 from tests.conftest import performed
+from tests.tasks.scripted import Mishap, move, perform
+from tests.tasks.scripted_scene import ROBOT, Moved
 
 NONE = Jitter(0.0, 0.0)
 FRAME = Pose((0.0, 0.0, -0.05), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0))
@@ -74,7 +76,9 @@ def test_repetitions_go_through_starts_which_are_in_the_file_s_frames() -> None:
     for seed in range(6):
         pose = task.scene(seed, NONE).body("stool").pose * FRAME
         assert pose.position == pytest.approx((0.1 * (seed % 3), 0.0, 0.2))
-    assert task.parameters()["task.starts"] == 3
+    told = {"task.scene": "stool on slab", "task.starts": 3, "task.premises": []}
+    told |= {"task.scene_digest": task.parameters()["task.scene_digest"]}
+    assert task.parameters() == {**told, "task.seconds": 2.5, "task.moved": 0.0}
     assert "starts" not in task.scene(0, NONE).to_wire()
 
 
@@ -111,12 +115,43 @@ def test_the_spread_of_forces_is_of_the_weight() -> None:
     assert spread(scene, []) is None
 
 
+class Restless(Moved):
+    """Its slab slides at 30 mm/s, pressed by 19 N and 21 N in turns."""
+
+    def do_contact_forces(self) -> list[Any]:
+        self.velocities["slab"][0] = 0.03
+        return [("body/slab", "ground", np.array([0, 0, 20 + (-1) ** len(self.asked), 0, 0, 0]))]
+
+
+def test_the_whole_score_of_what_ends_elsewhere() -> None:
+    """The slab goes 30 mm aside and 4 mm down, the stool leans 6 mm beside it, the door opens.
+    8 in 9 of the samples at rest have the speed, and one body of two."""
+    scene = replace(SCENE, robot=ROBOT, gravity=(0.0, 0.0, -10.0))
+    asked = {"tilt": 30.0}, {}, {"tilt": 30.0, "within": 0.005}
+    premises = [rests_on("stool", "slab", **how) for how in asked]
+    task = Settling(scene, [*premises, rests_on("slab", "stool", within=0.1)], seconds=2.0)
+    shove, tip = move("slab", y=0.03, z=-0.004), move("stool", tilt=0.5)
+    script = Mishap("settle", 1.4, shove), Mishap("rest", 0.0, tip)
+    outcome, process = perform(task, *script, process=Restless((0.1, 0.05)))
+    assert outcome.metrics == pytest.approx({
+        "farthest": np.hypot(30.0, 4.0), "tilt": np.degrees(0.5), "sunk": 4.0, "restless": 20.0,
+        "energy": 400.0, "force_jitter": 100 / 15, "premises": 0.25,
+    })  # fmt: skip
+    assert outcome.reasons == tuple(f"not: {premise}" for premise in task.premises[1:])
+    assert outcome.reasons[0] == "not: stool rests on slab (within 20 mm, tilt at most 20 deg)"
+    stool = STOOL.pose * Pose(quaternion=(np.cos(0.25), np.sin(0.25), 0.0, 0.0)) * FRAME
+    way = 1000 * np.linalg.norm(np.subtract(stool.position, (STOOL.pose * FRAME).position))
+    ways, tilts = {"slab": 30.2655, "stool": round(way, 4)}, {"slab": 0.0, "stool": 28.6479}
+    assert outcome.details["ways"] == {**ways, "door": 0.0, "drawer": 0.0}
+    assert outcome.details["tilts"] == {**tilts, "door": 5.7296, "drawer": 0.0}
+    assert outcome.details["places"]["stool"] == pytest.approx(stool.as_array())
+    assert [a.phase for a in process.asked if a.began >= 1.75] == ["rest"] * 10
+
+
 @pytest.mark.engine
-def test_a_stool_rests_on_a_slab_and_a_premise_that_fails_says_so(case: Case) -> None:
-    premises = [rests_on("stool", "slab"), rests_on("slab", "stool")]
-    record = performed(case, Settling(SCENE, premises))
-    assert record.metrics["premises"] == 0.5
-    assert record.reasons == ("not: slab rests on stool (within 20 mm, tilt at most 20 deg)",)
+def test_a_stool_rests_on_a_slab(case: Case) -> None:
+    record = performed(case, Settling(SCENE, [rests_on("stool", "slab")]))
+    assert record.metrics["premises"] == 1.0
     assert record.metrics["farthest"] == pytest.approx(10.0, abs=1.0)
     assert record.metrics["tilt"] < 1.0
     assert record.metrics["restless"] < 1.0

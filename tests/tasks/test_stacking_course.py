@@ -12,7 +12,6 @@ import pytest
 from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.panda import READY
 from pytest_simbench.motion.registry import find
-from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Pose
 from pytest_simbench.tasks import Jitter, Stacking, stacking
 from pytest_simbench.tasks.arm import Speeds
@@ -37,33 +36,6 @@ def test_the_places_in_their_order() -> None:
         for level, z in ((0, 0.325), (1, pytest.approx(0.375)), (2, pytest.approx(0.425)))
     ]
     assert len(Stacking().places()) == Stacking().cubes == 15
-
-
-@pytest.mark.parametrize(
-    ("task", "settle", "counted"),
-    [
-        (Stacking(settle=7.0), "7 s", "0.5 s after release"),
-        (Stacking(check_delay=0.7), "60 s", "0.7 s after release"),
-        (Stacking().study(), "60 s", "0.5 s after the hand has retreated"),
-    ],
-)
-def test_it_says_what_it_measures(task: Stacking, settle: str, counted: str) -> None:
-    assert (task.name, task.study_timeout) == ("stacking", 900.0)
-    end, share = f"the same, {settle} after the task ended", {"kind": "share", "of": 15}
-    assert task.metrics == (
-        Metric("placed", "placed", **share, study=True,
-               doc=f"within 5 cm in x and y of the target, {counted}"),
-        Metric("at_end", "at the end", **share, study=True, doc=end),
-        Metric("placed_strict", "placed, strict", **share,
-               doc="within 1 cm in x, y and z of the target and tilted by less than 5 degrees"),
-        Metric("at_end_strict", "at the end, strict", **share, doc=end),
-        Metric("towers", "towers complete", kind="share", of=3,
-               doc="towers all of whose cubes are strictly in place at the end"),
-        Metric("untouched_moved", "untouched moved", unit="cubes", better="lower", least=0,
-               doc="cubes nobody handled that are more than 1 cm away from their start"),
-        Metric("failed_picks", "failed picks", unit="picks", better="lower", least=0,
-               doc="cubes that could not be reached, planned for, or held"),
-    )  # fmt: skip
 
 
 def test_another_robot_stacks_in_the_same_world() -> None:

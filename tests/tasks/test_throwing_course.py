@@ -103,30 +103,6 @@ def test_all_its_motions_are_feasible(seed: int) -> None:
     assert shares[True, "throw"] == pytest.approx(0.90, abs=0.01)
 
 
-def test_what_the_metrics_say() -> None:
-    """Name, unit, direction and kind are what records, tables and gates go by."""
-    assert [(m.name, m.unit, m.better, m.kind, m.of, m.study) for m in TASK.metrics] == [
-        ("moved", "", None, "share", 6, True),
-        ("hit", "", "higher", "yes_no", None, False),
-        ("moved_otherwise", "cubes", "lower", "value", None, False),
-        ("lost_in_transit", "", "lower", "yes_no", None, False),
-        ("landing_x", "m", None, "value", None, False),
-        ("landing_error", "m", "lower", "value", None, False),
-        ("flight_error", "m", "lower", "value", None, False),
-        ("release_speed", "m/s", None, "value", None, False),
-        ("release_velocity_error", "m/s", "lower", "value", None, False),
-        ("release_position_error", "m", "lower", "value", None, False),
-        ("release_time_error", "s", "lower", "value", None, False),
-        ("limits", "%", None, "value", None, False),
-    ]
-    docs = {m.name: m.doc for m in TASK.metrics}
-    assert docs["moved"] == (
-        "cubes of the pyramid off by more than 5 cm, 3 s after, by the thrown cube"
-    )
-    assert TASK.study().metrics[0].doc == "cubes of the pyramid off by more than 5 cm, 3 s after"
-    assert TASK.smoke() == replace(TASK, settle=2.0)
-
-
 def test_phases_are_named() -> None:
     """Errors, progress and resource samples go by them, and times by the marks."""
     _, process = thrown()

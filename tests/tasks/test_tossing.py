@@ -21,6 +21,7 @@ from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray
 from pytest_simbench.tasks import Jitter, Tossing
 from pytest_simbench.tasks.tossing import off
 from tests.conftest import case_of, measured
+from tests.tasks.scripted import perform
 
 SPIN = np.array([3.0, -7.0, 5.0])
 """[rad/s], in the body and, since all of a cube's moments are equal, in the world."""
@@ -86,6 +87,16 @@ def test_the_scene_starts_as_the_toss_did_and_is_not_disturbed() -> None:
     assert box.linear_velocity == (1.0, -0.5, 0.0)
     assert box.angular_velocity == pytest.approx(tuple(toss.start.rotation() @ SPIN))
     assert (box.inertia() == 8.1e-4).all()
+
+
+def test_a_cube_that_stays_is_off_by_the_whole_way_and_turn() -> None:
+    toss = Tossing(FLIGHTS).real(5)
+    gone = np.linalg.norm(toss.state[:, :3] - toss.state[0, :3], axis=1)
+    turned = np.linalg.norm(SPIN) * toss.time
+    outcome, _ = perform(Tossing(FLIGHTS), seed=5)
+    means = 100 * gone.mean() / EDGE, np.degrees(turned.mean())
+    assert [*outcome.metrics.values()] == pytest.approx(means)
+    assert outcome.details == {"toss": toss.index, "at_end": pytest.approx([gone[-1], turned[-1]])}
 
 
 def test_records_name_the_tosses_by_their_digest() -> None:

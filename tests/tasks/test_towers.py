@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.records.metrics import Metric
 from pytest_simbench.tasks import Jitter, LeaningTowers
-from pytest_simbench.tasks.base import CUBE_MASS, CUBE_SIZE
+from pytest_simbench.tasks.base import CUBE_SIZE
 from tests.tasks.scripted import Mishap, move, perform
 
 
@@ -62,35 +61,3 @@ def test_a_cube_stands_within_1_cm_of_its_start(offset: dict[str, float], standi
     outcome, _ = perform(task, Mishap("settle", 2.0, move("cube_03", **offset)))
     assert outcome.metrics["standing"] == standing
     assert outcome.metrics["towers"] == math.floor(standing)
-
-
-def test_the_towers_as_they_are_built() -> None:
-    task = LeaningTowers(margins=(0.0025, 0.01), levels=3)
-    scene = task.scene(3, Jitter())
-    assert scene.name == "leaning towers"
-    assert scene.robot is None
-    assert [body.name for body in scene.free_bodies] == [f"cube_0{n}" for n in range(1, 7)]
-    assert [task.tower_of(number) for number in range(6)] == [1, 1, 1, 2, 2, 2]
-    assert scene == task.scene(2, Jitter(1.0, 1.0))  # no jitter: it would eat the margin
-    assert np.array([body.pose.position for body in scene.bodies]) == pytest.approx(
-        np.array(
-            [
-                *([0.4, 0.0, 0.025], [0.415, 0.0, 0.075], [0.43, 0.0, 0.125]),
-                *([0.4, 0.3, 0.025], [0.41, 0.3, 0.075], [0.42, 0.3, 0.125]),
-            ]
-        )
-    )
-    assert {(body.size, body.mass) for body in scene.bodies} == {((CUBE_SIZE,) * 3, CUBE_MASS)}
-    colours = [body.colour for body in scene.bodies]
-    assert colours == [colours[0], colours[1], colours[0]] * 2
-    assert colours[0] != colours[1]
-
-
-def test_it_says_what_it_measures() -> None:
-    assert LeaningTowers() == LeaningTowers((0.008, 0.010, 0.012), 4, 3.0)
-    assert (LeaningTowers.name, LeaningTowers.study_timeout) == ("leaning towers", 60.0)
-    assert LeaningTowers(settle=2.5).metrics == (
-        Metric("standing", "standing", kind="share", of=12,
-               doc="cubes within 1 cm of their start 2.5 s later"),
-        Metric("towers", "towers", kind="share", of=3, doc="towers all of whose cubes stand"),
-    )  # fmt: skip
