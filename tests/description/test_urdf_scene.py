@@ -8,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pytest_simbench.description.mesh_check import read_stl, written_stl
+from pytest_simbench.description.mesh_check import read_stl
+from pytest_simbench.description.shapes import write_stl
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.experiment.scene_file import SceneFile, read_scene_file
 from pytest_simbench.scene import Coupling, Polytope
-from pytest_simbench.scene.robot import FREE, WIDEST
+from pytest_simbench.scene.robot import FASTEST, FREE, WIDEST
 from pytest_simbench.simulator import DescriptionError
+from tests.approval import assert_approved
 from tests.conftest import ADAPTERS, case_of
 
 CABINET = """<robot name="cabinet">
@@ -69,6 +71,7 @@ def test_joints_have_no_drives_and_the_dynamics_of_the_file(tmp_path: Path) -> N
     assert {name: list(ends) for name, ends in prepared.limits.items()} == {
         "rail": [-0.2, 0.3], "hinge": [-WIDEST, WIDEST],
     }  # fmt: skip
+    assert prepared.velocity_limits == {"rail": FASTEST, "hinge": FASTEST}
     assert [len(link.shapes) for link in prepared.moving_links] == [1, 2]  # with its handle
     assert (scene.name, scene.file) == ("cabinet", str(tmp_path / "cabinet.urdf"))
 
@@ -91,15 +94,13 @@ def test_round_shapes_are_hulls_that_touch_them_from_inside(tmp_path: Path) -> N
 
 
 def test_of_everything_it_is_told_what_became_of_it(tmp_path: Path) -> None:
-    account = {line.quantity: (line.state, line.where) for line in read(tmp_path).account}
-    assert account["joint type (continuous)"] == ("approximated", "hinge")
-    assert account["geometry sphere, cylinder"] == ("approximated", "door, drawer")
-    assert account["limit effort, velocity"][0] == "not carried"
-    for tag, where in {
-        "visual": "carcass", "material": "grey", "safety_controller": "rail",
-        "gazebo": "cabinet", "transmission": "motor",
-    }.items():  # fmt: skip
-        assert account[tag] == ("not carried", where)
+    hull = Polytope([(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0), (0, 0, 0.1)])
+    write_stl(tmp_path / "knob.stl", hull)
+    knob = ('<box size=".02 .02 .1"/>', '<mesh filename="knob.stl"/>')
+    follow = ("<dynamics", '<mimic joint="hinge" offset="1"/><dynamics')
+    for name, changes in (("cabinet", [knob]), ("cabinet-follows", [follow])):
+        account = read(tmp_path, *changes).account
+        assert_approved(name, "\n".join(" | ".join(line.to_wire().values()) for line in account))
 
 
 @pytest.mark.parametrize(
@@ -151,8 +152,7 @@ def test_packages_are_folders_above_the_file_or_beside_one(tmp_path: Path) -> No
     hull = Polytope([(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0), (0, 0, -0.7)])
     for package in ("shop", "parts"):
         (tmp_path / package / "meshes").mkdir(parents=True)
-        stl = written_stl(hull.points[np.array(hull.triangles)])
-        (tmp_path / package / "meshes" / "knob.stl").write_bytes(stl)
+        write_stl(tmp_path / package / "meshes" / "knob.stl", hull)
         mesh = f'<mesh filename="package://{package}/meshes/knob.stl"/>'
         assert read(folder, ('<sphere radius=".05"/>', mesh)).scene.file_lift == pytest.approx(0.7)
     deep = tmp_path / "shop" / "robots" / "one" / "urdf"

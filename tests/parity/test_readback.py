@@ -5,20 +5,23 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.parity.readback import remembering
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import Capability, PreparedRobot, Settings
-from pytest_simbench.testing.faults import FAULTS, rounds, true_scene
+from pytest_simbench.testing.faults import FAULTS, mechanisms, rounds, true_scene
+from tests.approval import assert_approved
 
 TRUE = true_scene()
 OTHER = replace(TRUE, gravity=(0.0, 0.0, -1.0)).with_pose("cube", Pose.at(0.3, 0.3, 1.0))
 
 
 class Helper:
-    def __init__(self) -> None:
-        self.prepared = PreparedRobot(TRUE.robot)
+    def __init__(self, owner: Adapter) -> None:
+        self.owner, self.prepared = owner, PreparedRobot(TRUE.robot)
         self.cube = TRUE.body("cube")
 
 
@@ -28,7 +31,7 @@ class Adapter:
     def __init__(self) -> None:
         self.scene: Any = TRUE
         self.robot: Any = TRUE.robot
-        self.helper = Helper()
+        self.helper = Helper(self)
         self.settings = Settings()
 
 
@@ -59,6 +62,21 @@ def test_rounds_hold_every_fault_once_and_no_quantity_twice() -> None:
         quantities = [fault.quantity for fault in group.values()]
         assert len(quantities) == len(set(quantities))
     assert len(groups) == 2
+
+
+def test_every_fault_changes_its_quantity_by_so_much() -> None:
+    told, able = [], list(Capability)
+    for true, faults in [*((TRUE, group) for group in rounds(able)), *mechanisms(able)]:
+        wrong = true
+        for fault in faults.values():
+            wrong = fault.plant(wrong)
+        scene, built = (expected_quantities(world, Settings()) for world in (true, wrong))
+        for name, fault in faults.items():
+            right, found = scene[fault.quantity], built.get(fault.quantity, ())
+            alike = np.shape(right) == np.shape(found)
+            size = f"{np.abs(np.subtract(right, found)).max():.3g}" if alike else "not alike"
+            told.append(f"{name}: {fault.what}: {fault.quantity} {size}")
+    assert_approved("faults", "\n".join(told))
 
 
 def test_rounds_leave_out_what_an_engine_cannot_be_wrong_in() -> None:

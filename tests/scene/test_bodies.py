@@ -367,6 +367,9 @@ def test_links_that_collide_keep_their_own_friction_or_that_they_do_not_is_told(
     assert sorted(made.frictions) == pytest.approx([0.0, 1.0])
     _, problem = combined(own, "minimum")
     assert f"of {robot.name} and itself it is off by 0.5" in problem
+    own = replace(own, robot=replace(robot, self_collide=False))
+    made, _ = combined(own, "mean")
+    assert [made.ground_friction, made.arm.friction] == pytest.approx([0.5, 0.5])
 
 
 def test_an_unknown_rule_is_refused_with_those_there_are() -> None:

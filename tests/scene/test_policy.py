@@ -145,6 +145,7 @@ def test_out_of_reach_the_joints_stay_within_their_limits() -> None:
         (Command(tool=Pose((math.nan, 0.0, 0.0))), "the position of the tool is nan; it must be"),
         (Command(tool=Pose(quaternion=(1.0, 1.0, 0.0, 0.0))), "quaternion of the tool has the len"),
         (Command(gripper=[0.01, 0.02]), r"gripper of shape \(2,\), not one number"),  # type: ignore[arg-type]
+        (Command(gripper="wide"), "answers gripper='wide', which is no number"),  # type: ignore[arg-type]
         (Command(position=START[:7], velocity=START[:7]), "commands position and velocity at once"),
         (Command(tool=(1, 2, 3)), "which is no Pose"),  # type: ignore[arg-type]
         (Command(tool_change=(1, 2, 3)), r"a tool_change of shape \(3,\), not \(6,\)"),
@@ -157,7 +158,8 @@ def test_what_is_no_command_is_told(answer: Any, told: str) -> None:
 
 
 def test_motors_take_efforts_alone() -> None:
-    at = SetPoints(panda().as_motors(), START, np.zeros(9), 0.1)
+    at = SetPoints(panda().as_motors(), START, np.full(9, 2.0), 0.1)
+    assert at.effort.tolist() == [2.0] * 9
     at.after(Command(effort=np.arange(7.0)))
     assert at.effort.tolist() == [*range(7), 0.0, 0.0]
 

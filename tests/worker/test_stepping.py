@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,6 +140,23 @@ def asked(answer: Callable[[], bool]) -> Loop:
     return Loop(20, 20, 0, (row, none, none), 0.04, lambda *_: (row, none) if answer() else None)
 
 
+def test_a_loop_goes_evenly_from_answer_to_answer_as_late_as_declared() -> None:
+    said = iter([(np.array([4.0]), np.array([6.0])), (np.array([0.0]), np.array([7.0])), None])
+    seen: list[tuple[Any, ...]] = []
+    start = np.array([1.0]), np.array([9.0]), np.array([5.0])  # its velocity is not gone on with
+    loop = Loop(2, 3, 1, start, 0.1, lambda *now: seen.append(now) or next(said))  # type: ignore[func-returns-value]
+    rows, steps, more = loop.rows(), [], True
+    for k in range(3):
+        more = more and loop.ask(0.1 * k, np.full((2, 1), k), np.full((1, 13), k))
+        steps += [np.ravel(next(rows)).tolist() for _ in range(2) if more]
+    assert (loop.steps, more) == (6, False)
+    assert steps == [[1.0, 0.0, 5.0], [2.5, 30.0, 6.0], [4.0, 30.0, 6.0], [2.0, -40.0, 7.0]]
+    assert [np.ravel(told).tolist() for _, _, told, _ in seen] == [[1.0, 0.0, 5.0], *steps[1::2]]
+    assert [(time, *joints[:, 0], bodies[0, 0]) for time, joints, _, bodies in seen] == [
+        (0.1 * k, k, k, k) for k in range(3)
+    ]
+
+
 def test_a_question_is_no_time_of_the_steps_also_where_the_policy_ends_it() -> None:
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
         burnt, wall, clocks = alone.submit(_ask_thrice).result()
@@ -232,6 +250,12 @@ def test_a_state_that_is_no_number_is_seen_within_a_tenth_of_a_second(
     with pytest.raises(DivergedError, match=f"{what} is not finite at t = .*timestep=0.002"):
         stepping(toy, robot=panda()).wait(0.5 if at > 0.1 else 0.05, None)
     assert toy.time <= at + 0.1 + 1e-9
+
+
+def test_a_huge_state_is_a_number() -> None:
+    toy = Toy()
+    toy.bodies = np.full((1, 13), 1e200)
+    assert stepping(toy).wait(0.01, None) == {}
 
 
 def test_log_at_its_period() -> None:
