@@ -31,14 +31,6 @@ def test_reach_of_a_box() -> None:
     assert reaches[(0.577, 0.577, 0.577)] == pytest.approx(6 / np.sqrt(3))
 
 
-def test_the_order_of_shapes_does_not_matter() -> None:
-    mirrored = [reach(placed(box_corners((1, 1, 1)), Pose.at(x, 0, 0))) for x in (-2.0, 2.0)]
-    boxes = [("boxes", row) for row in mirrored]
-    first, second = outlines(boxes), outlines(boxes[::-1])
-    np.testing.assert_array_equal(first["boxes"], second["boxes"])
-    assert first["meshes"].shape == (0, 26)
-
-
 def stl_binary() -> bytes:
     floats = np.zeros(12, "<f4")
     floats[3:] = TRIANGLE.ravel()
@@ -92,10 +84,6 @@ def test_order_is_by_what_tells_symmetric_shapes_apart() -> None:
         found = outlines([*(("boxes", rows[k]) for k in order), *meshes[::-1]])
         for name, value in wanted.items():
             np.testing.assert_array_equal(found[name], value)
-
-
-def test_a_point_reaches_as_points_do() -> None:
-    np.testing.assert_array_equal(reach(np.array([1.0, 2, 3])), DIRECTIONS @ [1, 2, 3])
 
 
 def test_directions_are_unit_vectors_to_faces_edges_and_corners() -> None:

@@ -17,8 +17,6 @@ from pytest_simbench.simulator import FOLLOWER, Deviation, ParityError
 SOFT = Deviation("", "contacts are soft")
 NO_ROTOR = Deviation("joint/*/armature", "no rotor inertia")
 ROUND = Deviation("link/*/meshes body/*/boxes", "corners are rounded", within=1e-3)
-UP = [0.0, 0.0, 0.0]
-"""The rest of the quaternion of what is not turned."""
 EXPECTED = {"gravity": [0, 0, -9.8], "joint/a/armature": 0.1, "link/a/meshes": np.ones((1, 26))}
 
 
@@ -51,9 +49,6 @@ def test_a_difference_is_excused_up_to_its_declared_size() -> None:
     assert check(EXPECTED, near, (ROUND,), "sim") == [
         "link/*/meshes body/*/boxes: corners are rounded (differs by at most 0.001)"
     ]
-    far = {**EXPECTED, "link/a/meshes": np.full((1, 26), 1.002)}
-    with pytest.raises(ParityError, match="differ by up to 0.002.*declared is at most 0.001"):
-        check(EXPECTED, far, (ROUND,), "sim")
 
 
 def test_a_size_does_not_excuse_silence() -> None:
@@ -69,9 +64,9 @@ def test_a_size_does_not_excuse_silence() -> None:
         *(("gravity", [0.0, 0.0, -9.8], [0.0, 0.0, -9.8], kind)
           for kind in (np.nan, [0, 0], [0, 0, -9.8, 0])),
         ("joint/a/limits", [0.0, 2.0], [0.0, 2.00019], [0.0, 2.0003]),
-        ("body/a/pose", [0, 0, 0, 1, *UP], [9e-7, 0, 0, 0.99999, *UP], [2e-6, 0, 0, 1, *UP]),
+        ("body/a/pose", [0, 0, 0, 1, 0, 0, 0], [9e-7, 0, 0, 1, 0, 0, 0], [2e-6, 0, 0, 1, 0, 0, 0]),
         ("body/a/pose", [1, 2, 3, *[0.5] * 4], [1, 2, 3, *[-0.5] * 4], [1, 2, 3, *[0.5] * 3, -0.5]),
-        ("body/a/pose", [0, 0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0, 0], [0, 0, 0, 0, 1, 0, 0]),
+        ("body/a/pose", [0, 0, 0, 1, 0, 0, 0], [0, 0, 0, 0.99999, 0, 0, 0], [0, 0, 0, 0, 1, 0, 0]),
         ("link/a/pose", [0, 0, 0, 1, 0, 0, 0], [9e-6, 0, 0, 1, 0, 0, 0], [2e-5, 0, 0, 1, 0, 0, 0]),
         ("body/a/boxes", [[0.0, 1.0]], [[9e-6, 1.0]], [[2e-5, 1.0]]),
         ("body/a/meshes", [[0.0, 1.0]], [[9e-6, 1.0]], [[2e-5, 1.0]]),
@@ -222,9 +217,7 @@ def test_what_lasts_is_held_against_the_first_reading() -> None:
         ({"body/can/margin": 1.0019}, "1. when it was loaded, 1.0019 at t = 0.123 s$"),
         ({"body/can/mass": None}, "mass while it ran: 1. .*, not told at t = 0.123 s$"),
         ({"body/can/new": 2.0}, "new while it ran: not told .*, 2. at t = 0.123 s$"),
-        ({"body/shelf/pose": np.ones(7)}, "^sim changed body/shelf/pose"),
-        ({"link/base/pose": np.ones(7)}, "^sim changed link/base/pose"),
-        (dict.fromkeys([*LASTS][:2], 2.0), "0.123 s; and body/can/friction$"),
+        (dict.fromkeys([*LASTS][5:7], np.ones(7)), "body/shelf/pose .*; and link/base/pose$"),
         (dict.fromkeys([*LASTS][:4], 2.0), "; and .*friction, .*/margin, .*/gravity$"),
         (dict.fromkeys([*LASTS][:5], 2.0), "; and .*friction, .*/margin, .*/gravity and 1 more$"),
     ):

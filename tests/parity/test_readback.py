@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 
 from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.parity.readback import remembering
@@ -35,36 +35,22 @@ class Adapter:
         self.settings = Settings()
 
 
-def test_everything_remembered_is_replaced_and_put_back() -> None:
+def test_everything_remembered_is_replaced_and_put_back_also_after_an_error() -> None:
     adapter: Any = Adapter()
     prepared = adapter.helper.prepared
-    with remembering(adapter, OTHER):
+    with suppress(KeyError), remembering(adapter, OTHER):
         assert adapter.scene is OTHER
         assert adapter.robot is OTHER.robot
         assert adapter.helper.cube is OTHER.body("cube")
         assert adapter.helper.prepared is not prepared
+        raise KeyError("planned")
     assert adapter.scene is TRUE
     assert adapter.helper.prepared is prepared
     assert adapter.helper.cube is TRUE.body("cube")
 
 
-def test_it_is_put_back_after_an_error() -> None:
-    adapter: Any = Adapter()
-    with pytest.raises(KeyError), remembering(adapter, OTHER):
-        raise KeyError("planned")
-    assert adapter.scene is TRUE
-
-
-def test_rounds_hold_every_fault_once_and_no_quantity_twice() -> None:
-    groups = rounds(list(Capability))
-    assert sorted(name for group in groups for name in group) == sorted(FAULTS)
-    for group in groups:
-        quantities = [fault.quantity for fault in group.values()]
-        assert len(quantities) == len(set(quantities))
-    assert len(groups) == 2
-
-
 def test_every_fault_changes_its_quantity_by_so_much() -> None:
+    """In two worlds, none beside another of the same quantity."""
     told, able = [], list(Capability)
     for true, faults in [*((TRUE, group) for group in rounds(able)), *mechanisms(able)]:
         wrong = true

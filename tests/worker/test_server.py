@@ -358,8 +358,6 @@ class Rude(BaseException):
         (ValueError("so"), "EngineError", "ValueError: so"),
         (ValueError(), "EngineError", "ValueError"),
         (KeyboardInterrupt(), "EngineError", "KeyboardInterrupt"),
-        (KeyboardInterrupt("so"), "EngineError", "KeyboardInterrupt: so"),
-        (GeneratorExit("so"), "EngineError", "GeneratorExit: so"),
         (Rude("so"), "EngineError", "Rude: so"),
         (Mute(), "EngineError", "Mute: (its message cannot be read: RuntimeError)"),
         (Exiting(), "EngineError", "Exiting: (its message cannot be read: SystemExit)"),

@@ -225,7 +225,7 @@ def test_each_step_gets_its_own_command_and_a_wait_none() -> None:
     assert [c.ravel().tolist() for c in toy.commands] == [
         [k, 10.0 * k, 100.0 * k] for k in (1.0, 2.0, 3.0, 4.0, 5.0)
     ]
-    assert toy.steps == 5
+    assert (toy.steps, np.ravel(stepper.told).tolist()) == (5, [5.0, 50.0, 500.0])
     stepper.wait(0.01, None)
     assert (len(toy.commands), toy.steps) == (5, 10)
     stepper.wait(0.0, None)
@@ -250,12 +250,6 @@ def test_a_state_that_is_no_number_is_seen_within_a_tenth_of_a_second(
     with pytest.raises(DivergedError, match=f"{what} is not finite at t = .*timestep=0.002"):
         stepping(toy, robot=panda()).wait(0.5 if at > 0.1 else 0.05, None)
     assert toy.time <= at + 0.1 + 1e-9
-
-
-def test_a_huge_state_is_a_number() -> None:
-    toy = Toy()
-    toy.bodies = np.full((1, 13), 1e200)
-    assert stepping(toy).wait(0.01, None) == {}
 
 
 def test_log_at_its_period() -> None:
