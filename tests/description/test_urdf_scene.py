@@ -169,11 +169,7 @@ def test_packages_are_folders_above_the_file_or_beside_one(tmp_path: Path) -> No
         ('length=".2"', 'length="0"', "link 'drawer' has a cylinder whose size"),
         ('friction=".5"', 'friction="-1"', "joint 'rail' has a damping or friction"),
         ('name="hinge" type="continuous"', 'name="hinge" type="floating"', "'hinge' is floating"),
-        (
-            '<mass value="1"/>',
-            '<mass value="0"/>',
-            "has moments of inertia and no mass",
-        ),
+        ('<mass value="1"/>', '<mass value="0"/>', "has moments of inertia and no mass"),
         ('child link="door"', 'child link="gate"', "joint 'hinge' has the child 'gate'"),
     ],
 )

@@ -16,7 +16,7 @@ from pytest_simbench.motion.kinematics import FASTEST, Servo
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Pose, Scene
 from pytest_simbench.scene.policy import Command, Function, LoopError, Policy, Rhythm, as_policy
-from pytest_simbench.scene.set_points import SetPoints, Sight, written
+from pytest_simbench.scene.set_points import SetPoints, Sight, _changed, written
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5), mass=0.1)
 SCENE = Scene("one", (CUBE,), panda())
@@ -98,6 +98,12 @@ def test_the_arm_is_held_against_gravity() -> None:
     assert at.effort[7:].tolist() == [0.0, 0.0]
     at.after(Command(position=START[:7], effort=np.ones(7)))
     assert at.effort.tolist() == [1.0] * 7 + [0.0, 0.0]
+
+
+def test_a_tool_is_moved_and_turned_by_all_that_a_change_says() -> None:
+    tool = _changed(Pose.at(1.0, 2.0, 3.0), np.array([0.1, 0.2, 0.3, 2.5, 0.0, 0.0]))
+    wanted = [1.1, 2.2, 3.3, math.cos(1.25), math.sin(1.25), 0.0, 0.0]
+    assert tool.as_array() == pytest.approx(wanted)
 
 
 @given(st.lists(st.floats(-0.02, 0.02), min_size=6, max_size=6))

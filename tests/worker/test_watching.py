@@ -45,14 +45,8 @@ TOLD = {
     ("lift", "later"): FALLS.format(r"0\.3\d+"),
     ("time", "loaded"): rf"{BUILT}timestep: scene 0\.00\d+, \w+ 0\.00\d+",
     ("time", "later"): FALLS.format(r"0\.3\d+"),
-    (
-        "snap",
-        "loaded",
-    ): r"starts a world at t = 0 s with speeds that differ from the scene's by up to 1",
-    (
-        "snap",
-        "later",
-    ): r"let 'cube' jump: it moved by 0\.9[78]\d* m in the 0\.09\d* s before t = 0\.300 s",
+    ("snap", "loaded"): r"starts a world at t = 0 s with speeds .* the scene's by up to 1",
+    ("snap", "later"): r"'cube' jump: it moved by 0\.9[78]\d* m in the 0\.09\d* s .* = 0\.300",
 }
 """By cheat and time: the one sentence."""
 
@@ -190,8 +184,7 @@ def test_a_turning_body_and_a_joint_go_as_far_as_their_speeds_explain() -> None:
 
 @pytest.mark.parametrize("near", ["ground", "wall"])
 def test_what_flies_is_accelerated_by_gravity_alone(near: str) -> None:
-    """Within a twentieth, and what its damping may do; where it is clear of all by its radius, 1 cm
-    and twice its way in a glimpse."""
+    """To a twentieth, beside its damping; clear of all by its radius, 1 cm, and twice its way."""
     for off, away, damping, told in (
         (0.48, 1.0, 0.0, False), (0.5, 1.0, 0.0, True), (-0.5, 1.0, 0.0, True),
         (0.6, 0.055, 0.0, False), (0.6, 0.056, 0.0, True),
