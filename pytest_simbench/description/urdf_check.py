@@ -68,7 +68,7 @@ class Description:
         for element in xml.iter():
             if element.tag.startswith("xacro:"):
                 raise DescriptionError(
-                    f"{path}, line {self._lines.get(element, 0)}: <{element.tag}> is of xacro, "
+                    f"{path}, line {self._lines[element]}: <{element.tag}> is of xacro, "
                     "which nothing here expands; do that first (xacro FILE > NAME.urdf)"
                 )
         self.links = self._named(xml.findall("link"))

@@ -42,10 +42,14 @@ def obj_text() -> bytes:
     return f"# t\n{corners}\nvn 0 0 1\nf 1 2 3\n".encode()
 
 
-@pytest.mark.parametrize(("name", "data"), [("b.STL", stl_binary()), ("c.obj", obj_text())])
+MANY = ("a.stl", written_stl([TRIANGLE] * 300))
+
+
+@pytest.mark.parametrize(("name", "data"), [MANY, ("b.STL", stl_binary()), ("c.obj", obj_text())])
 def test_meshes_are_read(tmp_path: Path, name: str, data: bytes) -> None:
     (tmp_path / name).write_bytes(data)
     points = mesh_points(str(tmp_path / name))
+    assert points.dtype == np.float64
     np.testing.assert_array_equal(points, TRIANGLE[np.lexsort(TRIANGLE.T[::-1])])
 
 
@@ -90,13 +94,6 @@ def test_directions_are_unit_vectors_to_faces_edges_and_corners() -> None:
     assert DIRECTIONS.shape == (26, 3)
     np.testing.assert_allclose(np.linalg.norm(DIRECTIONS, axis=1), 1.0)
     assert len(np.unique(DIRECTIONS.round(6), axis=0)) == 26
-
-
-def test_many_triangles_have_few_corners(tmp_path: Path) -> None:
-    (tmp_path / "a.stl").write_bytes(written_stl([TRIANGLE] * 300))
-    points = mesh_points(str(tmp_path / "a.stl"))
-    assert points.dtype == np.float64
-    np.testing.assert_array_equal(points, TRIANGLE[np.lexsort(TRIANGLE.T[::-1])])
 
 
 @pytest.mark.parametrize(

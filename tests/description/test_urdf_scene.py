@@ -92,7 +92,8 @@ def test_round_shapes_are_hulls_that_touch_them_from_inside(tmp_path: Path) -> N
         assert np.hypot(*corners.T[:2]).max() == pytest.approx(reach, rel=0.01)
         assert np.abs(corners[:, 2]).max() == pytest.approx(height, rel=0.02)
         volume = np.pi * reach**2 * height * (2 if link is drawer else 4 / 3)
-        assert Polytope(np.unique(corners, axis=0)).volume == pytest.approx(volume, rel=0.1)
+        less = 0.007 if link is drawer else 0.1  # a regular polygon of 32 corners: 0.64 %
+        assert Polytope(np.unique(corners, axis=0)).volume == pytest.approx(volume, rel=less)
 
 
 def test_of_everything_it_is_told_what_became_of_it(tmp_path: Path) -> None:
@@ -100,7 +101,9 @@ def test_of_everything_it_is_told_what_became_of_it(tmp_path: Path) -> None:
     write_stl(tmp_path / "knob.stl", hull)
     knob = ('<box size=".02 .02 .1"/>', '<mesh filename="knob.stl"/>')
     follow = ("<dynamics", '<mimic joint="hinge" offset="1"/><dynamics')
-    for name, changes in (("cabinet", [knob]), ("cabinet-follows", [follow])):
+    rounds = ('<cylinder radius=".1" length=".2"/>', '<sphere radius=".05"/>')
+    plain = [(old, '<box size=".1 .1 .1"/>') for old in rounds]
+    for name, changes in (("cabinet", [knob]), ("cabinet-follows", [follow, *plain])):
         account = read(tmp_path, *changes).account
         assert_approved(name, "\n".join(" | ".join(line.to_wire().values()) for line in account))
 
@@ -166,6 +169,7 @@ def test_packages_are_folders_above_the_file_or_beside_one(tmp_path: Path) -> No
     ("old", "new", "why"),
     [
         ('radius=".05"', 'radius="a"', "link 'door' has <sphere radius='a'>"),
+        ('<sphere radius=".05"/>', "<mesh/>", "link 'door' has a mesh that cannot be used: ''"),
         ('length=".2"', 'length="0"', "link 'drawer' has a cylinder whose size"),
         ('friction=".5"', 'friction="-1"', "joint 'rail' has a damping or friction"),
         ('name="hinge" type="continuous"', 'name="hinge" type="floating"', "'hinge' is floating"),

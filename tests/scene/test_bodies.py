@@ -51,9 +51,11 @@ def test_restitution_and_damping_that_cannot_be() -> None:
             ball.changed(**{name: wrong})
 
 
-def test_a_fixed_body_does_not_start_to_move() -> None:
+def test_a_fixed_body_does_not_start_to_move_and_takes_no_force() -> None:
     with pytest.raises(SceneError, match="'post' has a velocity and no mass"):
         Box("post", (1.0, 1.0, 1.0), Pose(), angular_velocity=(0.0, 0.0, 1.0))
+    with pytest.raises(SceneError, match="'post' has no mass, so no force moves it"):
+        Box("post", (1.0, 1.0, 1.0), Pose(), wrenches=(PULL,))
 
 
 R, L = 0.3, 0.8
@@ -248,11 +250,6 @@ def test_what_no_force_can_be(values: dict[str, Any], message: str) -> None:
     with pytest.raises(SceneError) as caught:
         Wrench(**values)
     assert message in str(caught.value)
-
-
-def test_a_fixed_body_takes_no_force() -> None:
-    with pytest.raises(SceneError, match="'a' has no mass, so no force moves it; give it a mass"):
-        Box("a", (0.1,) * 3, Pose(), wrenches=(PULL,))
 
 
 SHAPES = (

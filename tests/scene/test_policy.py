@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pytest_simbench.ground.errors import PolicyError
 from pytest_simbench.motion.kinematics import FASTEST, Servo
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.scene import Box, Gripper, Pose, Scene
 from pytest_simbench.scene.policy import Command, Function, LoopError, Policy, Rhythm, as_policy
 from pytest_simbench.scene.set_points import SetPoints, Sight, _changed, written
 
@@ -168,6 +168,15 @@ def test_motors_take_efforts_alone() -> None:
     assert at.effort.tolist() == [2.0] * 9
     at.after(Command(effort=np.arange(7.0)))
     assert at.effort.tolist() == [*range(7), 0.0, 0.0]
+
+
+def test_a_robot_without_a_hand_is_moved_by_all_its_joints() -> None:
+    bare = replace(panda(), gripper=Gripper((), 0.0, 0.0, 0.0), limits=None, swing=None)
+    at = SetPoints(bare, START, START, 0.1)
+    at.after(Command(position=np.arange(9.0)))
+    assert at.position.tolist() == [*range(9)]
+    with pytest.raises(PolicyError, match="moves the gripper; robot 'panda' has none"):
+        at.after(Command(gripper=0.1))
 
 
 def test_without_a_model_the_tool_is_refused() -> None:
