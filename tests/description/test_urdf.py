@@ -60,7 +60,7 @@ def test_other_fingers_follow_and_nothing_is_drawn_where_asked() -> None:
     followers = {j.get("name"): m.attrib for j in root for m in j.iter("mimic")}
     told = {"joint": "panda_finger_joint1", "multiplier": "1", "offset": "0"}
     assert followers == {"panda_finger_joint2": told}
-    assert next(root.iter("visual"), None) is None
+    assert [len([*root.iter(tag)]) for tag in ("visual", "collision")] == [0, 17]
 
 
 def test_a_body_is_one_link(tmp_path: Path) -> None:
