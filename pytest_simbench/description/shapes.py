@@ -37,7 +37,7 @@ symmetry makes two different shapes equal."""
 
 def reach(points: FloatArray) -> FloatArray:
     """How far points (n, 3) reach in each of `DIRECTIONS` from the frame's origin [m], (26,)."""
-    return np.asarray((np.atleast_2d(points) @ DIRECTIONS.T).max(axis=0))
+    return np.asarray((points @ DIRECTIONS.T).max(axis=0))
 
 
 Outline = tuple[str, FloatArray]

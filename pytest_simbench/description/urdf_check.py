@@ -68,7 +68,7 @@ class Description:
         for element in xml.iter():
             if element.tag.startswith("xacro:"):
                 raise DescriptionError(
-                    f"{path}, line {self._lines.get(element, 0)}: <{element.tag}> is of xacro, "
+                    f"{path}, line {self._lines[element]}: <{element.tag}> is of xacro, "
                     "which nothing here expands; do that first (xacro FILE > NAME.urdf)"
                 )
         self.links = self._named(xml.findall("link"))
@@ -229,10 +229,10 @@ class Description:
         ends = []
         for tag in ("parent", "child"):
             end = self._only(joint, joint, tag)
-            if end.get("link", "") not in self.links:
-                link = end.get("link", "")
+            link = end.get("link", "")
+            if link not in self.links:
                 self.refuse(joint, f"has the {tag} {link!r}, which is no link of the file", end)
-            ends.append(end.get("link"))
+            ends.append(link)
         if ends[0] == ends[1]:
             self.refuse(joint, f"joins link {ends[0]!r} to itself")
         if kind == FIXED:
@@ -255,7 +255,7 @@ class Description:
 
     def _check_mimics(self) -> None:
         """Followers name a moving joint, and none follows itself, directly or through others."""
-        moving = {j.get("name"): j for j in self.joints if j.get("type") in MOVING}
+        moving = {j.attrib["name"]: j for j in self.joints if j.attrib["type"] in MOVING}
         follows: dict[str, str] = {}
         for name, joint in moving.items():
             for mimic in self._at_most_one(joint, joint, "mimic"):
@@ -264,7 +264,7 @@ class Description:
                 leader = mimic.get("joint", "")
                 if leader not in moving:
                     self.refuse(joint, f"follows {leader!r}, which is no moving joint", mimic)
-                follows[str(name)] = leader
+                follows[name] = leader
         for name in follows:
             leader, seen = name, set()
             while leader in follows and leader not in seen:
@@ -279,7 +279,7 @@ class Description:
         below: dict[str, list[str]] = {}
         for joint in self.joints:
             parent, child = (
-                self._only(joint, joint, t).get("link", "") for t in ("parent", "child")
+                self._only(joint, joint, tag).attrib["link"] for tag in ("parent", "child")
             )
             if child in above:
                 other = above[child].get("name")

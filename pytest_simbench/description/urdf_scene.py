@@ -78,14 +78,14 @@ class _World(Description):
             geometry.remove(shape)
             ET.SubElement(geometry, "mesh", filename=kept)
             self._meshes[kept] = kept
-            name = link.get("name", "")
+            name = link.attrib["name"]
             self._round[name] = max(gap, self._round.get(name, 0.0))
             return
         super()._check_geometry(link, geometry)
-        self._hulls += [link.get("name", "") for _ in geometry.findall("mesh")]
+        self._hulls += [link.attrib["name"] for _ in geometry.findall("mesh")]
 
     def _check_joint(self, joint: ET.Element) -> None:
-        name, limit = joint.get("name", ""), joint.find("limit")
+        name, limit = joint.attrib["name"], joint.find("limit")
         if joint.get("type") == "continuous":
             self._endless.append(name)
             joint.set("type", "revolute")
@@ -139,13 +139,14 @@ class _World(Description):
         limits: dict[str, tuple[float, float]] = {}
         mimics: dict[str, Coupling] = {}
         for joint in self.joints:
-            name, limit, mimic = joint.get("name", ""), joint.find("limit"), joint.find("mimic")
+            name, limit, mimic = joint.attrib["name"], joint.find("limit"), joint.find("mimic")
             if name in self._dynamics and limit is not None:
-                limits[name] = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
+                limits[name] = float(limit.attrib["lower"]), float(limit.attrib["upper"])
                 if mimic is not None:
                     ratio, offset = mimic.get("multiplier", "1"), mimic.get("offset", "0")
-                    leader = mimic.get("joint", "")
-                    mimics[name] = Coupling(name, leader, float(ratio), float(offset))
+                    mimics[name] = Coupling(
+                        name, mimic.attrib["joint"], float(ratio), float(offset)
+                    )
         starts: dict[str, float] = {}
         open_: list[str] = []
 

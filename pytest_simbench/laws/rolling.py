@@ -158,7 +158,7 @@ class RimlessWheel(
         first, second = (step / 2 - self.lean) / self.speed, step / 2 / top  # at most [s]
         seen = watch(world, first + second + 0.1)
         halves = np.arctan2(seen.bodies[:, 0, 5], seen.bodies[:, 0, 3])
-        angles = np.unwrap(2 * halves, period=2 * math.pi)
+        angles = np.unwrap(2 * halves)
         reached = seen.crossings(angles, step)
         found = float(seen.at(reached[0], seen.bodies[:, 0, 11])) if len(reached) else 0.0
         late, rate = self.pull, self.pull * before

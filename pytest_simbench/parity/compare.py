@@ -162,10 +162,8 @@ class Lasting:
             )
 
     def _same(self, name: str, value: Any) -> bool:
-        first = self._first.get(name)
-        if first is None or value is None:
-            return False
-        if np.array_equal(first, value) or _equal(name, first, value):
+        first = self._first.get(name)  # of what was not told None: as a number nan, equal to none
+        if _equal(name, first, value):
             return True
         gap = _gap(first, value) if name.rpartition("/")[2] in OUTLINES else None
         error = max((d.within or 0.0 for d in self._deviations if d.excuses(name)), default=0.0)
@@ -211,8 +209,6 @@ def _text(value: Any) -> str:
 
 
 def _difference_text(expected: Any, reported: Any) -> str:
-    if expected is None or reported is None:
-        return ""
     gap = _gap(expected, reported)
     big = np.size(expected) > 9
     return f", which differ by up to {gap:.3g}" if big and gap is not None else ""

@@ -43,14 +43,11 @@ def unit_rotation(unit: FloatArray) -> FloatArray:
 def quaternion_of(rotation: FloatArray) -> FloatArray:
     """Quaternion w, x, y, z of a rotation matrix: the eigenvector of Bar-Itzhack's matrix."""
     r = rotation
-    k = np.array(
-        [
-            [r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], r[0, 0] - r[1, 1] - r[2, 2], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2], r[1, 2] + r[2, 1]],
-            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1]],
-        ]
-    )
+    k = np.zeros((4, 4))  # symmetric; of it the lower half is looked at
+    k[0, 0] = r[0, 0] + r[1, 1] + r[2, 2]
+    k[1, :2] = r[2, 1] - r[1, 2], r[0, 0] - r[1, 1] - r[2, 2]
+    k[2, :3] = r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2]
+    k[3] = r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1]
     return np.asarray(np.linalg.eigh(k)[1][:, -1])
 
 

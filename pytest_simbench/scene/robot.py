@@ -294,8 +294,8 @@ class Robot(Wire):
         last = names[len(names) - len(self.beside) :]
         if self.beside != last or set(self.beside) & set(self.gripper.joints):
             raise SceneError(
-                f"the joints {', '.join(self.beside)} beside robot {self.name!r} are not its last, "
-                f"which are {', '.join(last)}; put them last, after the gripper's"
+                f"the joints {', '.join(self.beside)} beside robot {self.name!r} must be its last, "
+                f"after the gripper's; its last are {', '.join(last)}"
             )
         if self.limits is not None and len(self.limits.velocity) != len(self.arm_joints):
             raise SceneError(

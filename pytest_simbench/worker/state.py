@@ -185,7 +185,7 @@ def check_following(simulator: Simulator, scene: Scene, joints: FloatArray, goal
     """
     if scene.robot is None:
         return
-    reached, asked = joints[0], np.asarray(goal, dtype=float)
+    reached, asked = joints[0], np.asarray(goal)
     away = np.flatnonzero(np.abs(reached - asked) > EXCHANGED)
     if len(away) < 2 or not np.allclose(
         np.sort(reached[away]), np.sort(asked[away]), rtol=0.0, atol=ALIKE

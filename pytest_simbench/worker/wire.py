@@ -21,8 +21,7 @@ HEAD, CHUNK = 4, 1 << 16
 def pack(value: Any) -> Any:
     """Plain data from nested data with arrays, numpy scalars and tuples in it."""
     if isinstance(value, np.ndarray):
-        array = np.asarray(value, order="C")
-        return {"__array__": [array.dtype.str, list(array.shape), array.tobytes()]}
+        return {"__array__": [value.dtype.str, list(value.shape), value.tobytes()]}
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, dict):

@@ -96,11 +96,6 @@ def test_a_wrong_closure_is_refused(change: dict[str, object], message: str) -> 
         reduced(PreparedRobot(replace(robot, closures=(wrong,))))
 
 
-def test_a_link_is_not_held_at_itself() -> None:
-    with pytest.raises(SceneError, match="a closure holds link 'a' at itself"):
-        Closure("a", "a")
-
-
 @pytest.mark.parametrize(
     ("law", "message"),
     [

@@ -122,7 +122,8 @@ def test_files_beside_are_read_but_a_whole_home_is_no_room(
 def test_a_good_file_passes(tmp_path: Path) -> None:
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "m.stl").write_text("")
-    (tmp_path / "b.xml").write_text('<mujocoinclude><mesh file="m.stl"/></mujocoinclude>')
+    (tmp_path / "b.xml").write_text('<mujocoinclude><include file="meshes/c.xml"/></mujocoinclude>')
+    (tmp_path / "meshes" / "c.xml").write_text('<inside><mesh file="m.stl"/></inside>')
     (tmp_path / "a.xml").write_text(
         '<mujoco><compiler meshdir="meshes"/><include file="b.xml"/><body/></mujoco>'
     )

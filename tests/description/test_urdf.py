@@ -57,9 +57,10 @@ def test_lines_are_short_enough_for_bullet() -> None:
 
 def test_other_fingers_follow_and_nothing_is_drawn_where_asked() -> None:
     root = ET.fromstring(PreparedRobot(panda()).to_urdf(mimic=True, visuals=False))
-    followers = {j.get("name"): m.get("joint") for j in root for m in j.iter("mimic")}
-    assert followers == {"panda_finger_joint2": "panda_finger_joint1"}
-    assert next(root.iter("visual"), None) is None
+    followers = {j.get("name"): m.attrib for j in root for m in j.iter("mimic")}
+    told = {"joint": "panda_finger_joint1", "multiplier": "1", "offset": "0"}
+    assert followers == {"panda_finger_joint2": told}
+    assert [len([*root.iter(tag)]) for tag in ("visual", "collision")] == [0, 17]
 
 
 def test_a_body_is_one_link(tmp_path: Path) -> None:

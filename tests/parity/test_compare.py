@@ -9,9 +9,9 @@ import pytest
 
 from pytest_simbench.description.shapes import DIRECTIONS
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.parity.compare import check, compare, misfit
+from pytest_simbench.parity.compare import Lasting, check, compare, misfit
 from pytest_simbench.parity.readback import one_value
-from pytest_simbench.scene import Cylinder, Gripper, Pose, Scene
+from pytest_simbench.scene import Box, Cylinder, Gripper, Pose, Scene
 from pytest_simbench.simulator import FOLLOWER, Deviation, ParityError
 
 SOFT = Deviation("", "contacts are soft")
@@ -20,12 +20,9 @@ ROUND = Deviation("link/*/meshes body/*/boxes", "corners are rounded", within=1e
 EXPECTED = {"gravity": [0, 0, -9.8], "joint/a/armature": 0.1, "link/a/meshes": np.ones((1, 26))}
 
 
-def test_equal_values_are_one_number() -> None:
+def test_equal_values_are_one_number_and_different_ones_are_all_told() -> None:
     assert one_value([87.0, 87.0]) == 87.0
     assert np.ndim(one_value(np.full((2, 3), 0.5))) == 0
-
-
-def test_different_values_are_all_told() -> None:
     assert list(one_value([[1.0, 0.5], [1.0, 1.0]])) == [0.5, 1.0]
 
 
@@ -49,9 +46,6 @@ def test_a_difference_is_excused_up_to_its_declared_size() -> None:
     assert check(EXPECTED, near, (ROUND,), "sim") == [
         "link/*/meshes body/*/boxes: corners are rounded (differs by at most 0.001)"
     ]
-    far = {**EXPECTED, "link/a/meshes": np.full((1, 26), 1.002)}
-    with pytest.raises(ParityError, match="differ by up to 0.002.*declared is at most 0.001"):
-        check(EXPECTED, far, (ROUND,), "sim")
 
 
 def test_a_size_does_not_excuse_silence() -> None:
@@ -69,7 +63,7 @@ def test_a_size_does_not_excuse_silence() -> None:
         ("joint/a/limits", [0.0, 2.0], [0.0, 2.00019], [0.0, 2.0003]),
         ("body/a/pose", [0, 0, 0, 1, 0, 0, 0], [9e-7, 0, 0, 1, 0, 0, 0], [2e-6, 0, 0, 1, 0, 0, 0]),
         ("body/a/pose", [1, 2, 3, *[0.5] * 4], [1, 2, 3, *[-0.5] * 4], [1, 2, 3, *[0.5] * 3, -0.5]),
-        ("body/a/pose", [0, 0, 0, 1, 0, 0, 0], [0, 0, 0, 1, 0, 0, 0], [0, 0, 0, 0, 1, 0, 0]),
+        ("body/a/pose", [0, 0, 0, 1, 0, 0, 0], [0, 0, 0, 0.99999, 0, 0, 0], [0, 0, 0, 0, 1, 0, 0]),
         ("link/a/pose", [0, 0, 0, 1, 0, 0, 0], [9e-6, 0, 0, 1, 0, 0, 0], [2e-5, 0, 0, 1, 0, 0, 0]),
         ("body/a/boxes", [[0.0, 1.0]], [[9e-6, 1.0]], [[2e-5, 1.0]]),
         ("body/a/meshes", [[0.0, 1.0]], [[9e-6, 1.0]], [[2e-5, 1.0]]),
@@ -121,13 +115,13 @@ def test_what_the_comparison_says_word_by_word() -> None:
 
 
 def test_the_first_ten_differences_are_told() -> None:
-    expected = {f"joint/{k:02}/damping": float(k) for k in range(12)}
+    expected = {f"joint/{k:02}/damping": float(k) for k in range(11)}
     reported = {name: value + 1 for name, value in expected.items()}
     with pytest.raises(ParityError) as caught:
         check(expected, reported, (), "sim")
     parts = [f"joint/{k:02}/damping: scene {k}., sim {k + 1}." for k in range(10)]
     start = "sim built another world than the scene describes: "
-    assert str(caught.value) == start + "; ".join(parts) + "; and 2 more"
+    assert str(caught.value) == start + "; ".join(parts) + "; and 1 more"
     ten = dict(list(expected.items())[:10])
     with pytest.raises(ParityError) as caught:
         check(ten, dict(list(reported.items())[:10]), (), "sim")
@@ -183,11 +177,44 @@ def test_some_deviations_count_only_where_a_scene_has_their_word() -> None:
 
 def test_a_body_touches_elsewhere_by_its_reach_and_its_margin_across() -> None:
     upright = np.zeros((1, 26))
-    expected = {"body/peg/boxes": upright, "body/peg/margin": 0.0}
+    expected = {"body/peg/boxes": upright, "body/peg/rounds": upright[:0], "body/peg/margin": 0.0}
     grown = upright.copy()
     grown[0, DIRECTIONS[:, 2] == 0.0] -= 1e-4
     grown[0, DIRECTIONS[:, 2] > 0.9] += 1.0  # it is longer, too, which leaves its width
     assert misfit(expected, {"body/peg/boxes": grown}, "peg") == pytest.approx(1e-4)
-    told = {"body/peg/boxes": grown, "body/peg/margin": 1e-3}
+    told = {**expected, "body/peg/boxes": grown, "body/peg/margin": 1e-3}
     assert misfit(expected, told, "peg") == pytest.approx(1.1e-3)
     assert misfit(expected, {}, "peg") == 0.0
+
+
+SHELF = Box("shelf", (0.1, 0.1, 0.1), Pose.at(1.0, 0.0, 0.05))
+REACH = np.ones((1, 10))
+LASTS = {
+    **{f"body/can/{name}": 1.0 for name in ("mass", "friction", "margin", "gravity", "com")},
+    "body/shelf/pose": np.zeros(7), "link/base/pose": np.zeros(7), "body/can/boxes": REACH,
+    "body/can/rounds": REACH, "body/can/pose": np.zeros(7), "link/hand/pose": np.zeros(7),
+    "body/can/velocity": np.zeros(6), "joint/a/initial_position": 0.0,
+}  # fmt: skip
+
+
+def test_what_lasts_is_held_against_the_first_reading() -> None:
+    """But for what moves. A shape may differ by twice what the engine declares. The first
+    difference is told with both values, three more by their names."""
+    near = replace(ROUND, quantity="body/*/boxes body/*/margin")
+    lasting = Lasting(LASTS, Scene("s", (SHELF,)), "sim", (near, replace(near, within=None)))
+    fine = {"body/can/boxes": 1.0019 * REACH, "body/can/mass": 1.00009}
+    lasting.check({**LASTS, **dict.fromkeys([*LASTS][-4:], 5.0), **fine}, 0.1)
+    for wrong, said in (
+        ({"body/can/boxes": 1.0021 * REACH}, "t = 0.123 s, which differ by up to 0.0021$"),
+        ({"body/can/boxes": np.ones((2, 10))}, "1x10 numbers .*, 2x10 numbers at t = 0.123 s$"),
+        ({"body/can/rounds": 1.0019 * REACH}, "t = 0.123 s, which differ by up to 0.0019$"),
+        ({"body/can/margin": 1.0019}, "1. when it was loaded, 1.0019 at t = 0.123 s$"),
+        ({"body/can/mass": None}, "mass while it ran: 1. .*, not told at t = 0.123 s$"),
+        ({"body/can/new": 2.0}, "new while it ran: not told .*, 2. at t = 0.123 s$"),
+        (dict.fromkeys([*LASTS][5:7], np.ones(7)), "body/shelf/pose .*; and link/base/pose$"),
+        (dict.fromkeys([*LASTS][:4], 2.0), "; and .*friction, .*/margin, .*/gravity$"),
+        (dict.fromkeys([*LASTS][:5], 2.0), "; and .*friction, .*/margin, .*/gravity and 1 more$"),
+    ):
+        told = {name: value for name, value in {**LASTS, **wrong}.items() if value is not None}
+        with pytest.raises(ParityError, match=said):
+            lasting.check(told, 0.1234)

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-import pytest
+import numpy as np
 
+from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.parity.readback import remembering
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import Capability, PreparedRobot, Settings
-from pytest_simbench.testing.faults import FAULTS, rounds, true_scene
+from pytest_simbench.testing.faults import FAULTS, mechanisms, rounds, true_scene
+from tests.approval import assert_approved
 
 TRUE = true_scene()
 OTHER = replace(TRUE, gravity=(0.0, 0.0, -1.0)).with_pose("cube", Pose.at(0.3, 0.3, 1.0))
 
 
 class Helper:
-    def __init__(self) -> None:
-        self.prepared = PreparedRobot(TRUE.robot)
+    def __init__(self, owner: Adapter) -> None:
+        self.owner, self.prepared = owner, PreparedRobot(TRUE.robot)
         self.cube = TRUE.body("cube")
 
 
@@ -28,37 +31,38 @@ class Adapter:
     def __init__(self) -> None:
         self.scene: Any = TRUE
         self.robot: Any = TRUE.robot
-        self.helper = Helper()
+        self.helper = Helper(self)
         self.settings = Settings()
 
 
-def test_everything_remembered_is_replaced_and_put_back() -> None:
+def test_everything_remembered_is_replaced_and_put_back_also_after_an_error() -> None:
     adapter: Any = Adapter()
     prepared = adapter.helper.prepared
-    with remembering(adapter, OTHER):
+    with suppress(KeyError), remembering(adapter, OTHER):
         assert adapter.scene is OTHER
         assert adapter.robot is OTHER.robot
         assert adapter.helper.cube is OTHER.body("cube")
         assert adapter.helper.prepared is not prepared
+        raise KeyError("planned")
     assert adapter.scene is TRUE
     assert adapter.helper.prepared is prepared
     assert adapter.helper.cube is TRUE.body("cube")
 
 
-def test_it_is_put_back_after_an_error() -> None:
-    adapter: Any = Adapter()
-    with pytest.raises(KeyError), remembering(adapter, OTHER):
-        raise KeyError("planned")
-    assert adapter.scene is TRUE
-
-
-def test_rounds_hold_every_fault_once_and_no_quantity_twice() -> None:
-    groups = rounds(list(Capability))
-    assert sorted(name for group in groups for name in group) == sorted(FAULTS)
-    for group in groups:
-        quantities = [fault.quantity for fault in group.values()]
-        assert len(quantities) == len(set(quantities))
-    assert len(groups) == 2
+def test_every_fault_changes_its_quantity_by_so_much() -> None:
+    """In two worlds, none beside another of the same quantity."""
+    told, able = [], list(Capability)
+    for true, faults in [*((TRUE, group) for group in rounds(able)), *mechanisms(able)]:
+        wrong = true
+        for fault in faults.values():
+            wrong = fault.plant(wrong)
+        scene, built = (expected_quantities(world, Settings()) for world in (true, wrong))
+        for name, fault in faults.items():
+            right, found = scene[fault.quantity], built.get(fault.quantity, ())
+            alike = np.shape(right) == np.shape(found)
+            size = f"{np.abs(np.subtract(right, found)).max():.3g}" if alike else "not alike"
+            told.append(f"{name}: {fault.what}: {fault.quantity} {size}")
+    assert_approved("faults", "\n".join(told))
 
 
 def test_rounds_leave_out_what_an_engine_cannot_be_wrong_in() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import simpson
 
 from pytest_simbench.scene import (
     Body,
@@ -51,9 +52,11 @@ def test_restitution_and_damping_that_cannot_be() -> None:
             ball.changed(**{name: wrong})
 
 
-def test_a_fixed_body_does_not_start_to_move() -> None:
+def test_a_fixed_body_does_not_start_to_move_and_takes_no_force() -> None:
     with pytest.raises(SceneError, match="'post' has a velocity and no mass"):
         Box("post", (1.0, 1.0, 1.0), Pose(), angular_velocity=(0.0, 0.0, 1.0))
+    with pytest.raises(SceneError, match="'post' has no mass, so no force moves it"):
+        Box("post", (1.0, 1.0, 1.0), Pose(), wrenches=(PULL,))
 
 
 R, L = 0.3, 0.8
@@ -67,7 +70,7 @@ UP, ASIDE = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 
 @pytest.mark.parametrize("body", ROUNDS, ids=lambda body: body.name)
 def test_a_round_body_is_what_it_says(body: Body) -> None:
-    """Volume and inertia against points spread evenly in it, and its reach against the farthest."""
+    """Volume and inertia against its slices, and its reach against the farthest of points in it."""
     half = np.array(body.extents) / 2
     points = np.stack(np.meshgrid(*[np.linspace(-h, h, 121) for h in half]), -1).reshape(-1, 3)
     axial = np.array([0.0, 0.0, {"ball": 0.0}.get(body.name, L / 2)])
@@ -75,10 +78,12 @@ def test_a_round_body_is_what_it_says(body: Body) -> None:
     if body.name == "can":
         away = points * (1.0, 1.0, 0.0)
     inside = points[np.linalg.norm(away, axis=1) <= R]
-    cell = np.prod(2 * half / 120)
-    assert body.volume == pytest.approx(len(inside) * cell, rel=0.03)
-    square = (inside**2).mean(axis=0)
-    assert np.allclose(body.inertia(), body.mass * (square.sum() - square), rtol=0.03)
+    z = np.linspace(-half[2], half[2], 20001)
+    square = R**2 - np.maximum(np.abs(z) - (0.0 if body.name == "ball" else L / 2), 0.0) ** 2
+    assert body.volume == pytest.approx(simpson(np.pi * square, x=z), rel=1e-6)
+    discs = body.mass / body.volume * np.pi * square  # mass over thickness
+    across, about = simpson(discs * (square / 4 + z**2), x=z), simpson(discs * square / 2, x=z)
+    assert body.inertia() == pytest.approx([across, across, about], rel=1e-6)
     directions = np.array([UP, ASIDE, (0.6, 0.0, 0.8), (-0.48, 0.64, -0.6)])
     found = body.reach(directions)
     assert np.allclose(found, (inside @ directions.T).max(axis=0), atol=0.01)
@@ -250,11 +255,6 @@ def test_what_no_force_can_be(values: dict[str, Any], message: str) -> None:
     assert message in str(caught.value)
 
 
-def test_a_fixed_body_takes_no_force() -> None:
-    with pytest.raises(SceneError, match="'a' has no mass, so no force moves it; give it a mass"):
-        Box("a", (0.1,) * 3, Pose(), wrenches=(PULL,))
-
-
 SHAPES = (
     Box("wall", (0.02, 0.1, 0.2), Pose.at(0.05, 0, 0)),
     Cylinder("rod", 0.01, 0.1, Pose((-0.05, 0, 0), (0.8, 0.6, 0.0, 0.0))),
@@ -367,6 +367,9 @@ def test_links_that_collide_keep_their_own_friction_or_that_they_do_not_is_told(
     assert sorted(made.frictions) == pytest.approx([0.0, 1.0])
     _, problem = combined(own, "minimum")
     assert f"of {robot.name} and itself it is off by 0.5" in problem
+    own = replace(own, robot=replace(robot, self_collide=False))
+    made, _ = combined(own, "mean")
+    assert [made.ground_friction, made.arm.friction] == pytest.approx([0.5, 0.5])
 
 
 def test_an_unknown_rule_is_refused_with_those_there_are() -> None:

@@ -13,7 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.scene import Box, Gripper, Joint, Pose, Scene, SceneError
+from pytest_simbench.scene import Box, Closure, Coupling, Gripper, Joint, Pose, Scene, SceneError
+from pytest_simbench.scene.body import ZERO
+from pytest_simbench.scene.robot import MotionLimits
 from tests.hostile import HOSTILE, assert_harmless_terminal
 
 BOX = Box("a", (0.1, 0.1, 0.1), Pose.at(0, 0, 0.5), mass=1.0)
@@ -24,10 +26,7 @@ NAN, INF = math.nan, math.inf
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (
-            {"size": (0.1, 0.1, -0.1)},
-            "the size \\[m\\] of 'a' is -0.1; it must be a number above 0",
-        ),
+        ({"size": (0.1, 0.1, -0.1)}, r"the size \[m\] of 'a' is -0.1; it must be a number above 0"),
         ({"size": (0.1, 0.1, 0)}, "the size .* above 0"),
         ({"size": (0.1, 0.1)}, "the size .* must be 3 numbers"),
         ({"size": "0.1"}, "must be 3 numbers"),
@@ -39,15 +38,12 @@ NAN, INF = math.nan, math.inf
         ({"colour": (0, 0, 0, NAN)}, "the colour of 'a' is nan"),
         ({"pose": Pose((NAN, 0, 0))}, "the position of 'a' is nan"),
         ({"pose": Pose(quaternion=(0, 0, 0, 0))}, "quaternion of 'a' has the length 0; it must be"),
-        ({"pose": Pose(quaternion=(2, 0, 0, 0))}, "quaternion of 'a' has the length 2"),
         ({"pose": Pose(quaternion=(NAN, 0, 0, 0))}, "the quaternion of 'a' is nan"),
         ({"pose": Pose((0, 0))}, "the position of 'a' .* must be 3 numbers"),  # type: ignore[arg-type]
         ({"name": ""}, "a body has the name ''; give it a text"),
         ({"name": 3}, "a body has the name 3"),
         ({"name": "a/b"}, "a body has the name 'a/b'; a name has up to 100 printable"),
         ({"name": "a\0"}, r"a body has the name 'a\\x00'"),
-        ({"name": "a\nb"}, r"a body has the name 'a\\nb'"),
-        ({"name": ".."}, "a body has the name '..'"),
         ({"name": " a"}, "a body has the name ' a'"),
         ({"name": "x" * 101}, "a body has the name"),
         ({"name": "<a>"}, "none of / "),
@@ -89,7 +85,7 @@ JOINT = Joint("j", 1.0, 1.0, 1.0, 0.1, 0.0)
         ({"stiffness": -1.0}, "the stiffness of joint 'j' is -1.0"),
         ({"damping": NAN}, "the damping of joint 'j' is nan"),
         ({"initial_position": NAN}, "the initial position of joint 'j' is nan"),
-        ({"gravity": NAN}, "the share of gravity of the link on joint 'j' is nan"),
+        ({"rest": NAN}, "the rest position of the spring in joint 'j' is nan"),
         ({"gravity": 1.1}, "the share of gravity .* must be a number from -1e\\+06 to 1"),
     ],
 )
@@ -110,11 +106,12 @@ def test_a_joint_that_cannot_be(change: dict[str, Any], said: str) -> None:
         ({"base": Pose((NAN, 0, 0))}, "the position of the base of 'panda' is nan"),
         ({"joints": (JOINT, JOINT)}, "robot 'panda' has several drives for j"),
         ({"gripper": Gripper(("x",), 0.1, 0.0, 1.0)}, "the gripper .* the joints x, which have no"),
-        ({"beside": ("panda_joint1",)}, "the joints panda_joint1 beside robot 'panda' are not its"),
-        (
-            {"beside": ("panda_finger_joint2",)},
-            "_joint2; put them last, after the grip",
-        ),
+        ({"beside": ("panda_joint1",)}, "the joints panda_joint1 beside robot 'panda' must be its"),
+        ({"beside": ("panda_finger_joint2",)}, "_joint2 beside .* its last, after the gripper's"),
+        ({"stand": Pose((NAN, 0, 0))}, "the position of the stand of 'panda' is nan"),
+        ({"swing": ((0.0,) * 7, (0.0,) * 6)}, "the swing .* of 'panda' .* must be 7 numbers"),
+        ({"couplings": (Coupling("x", "panda_joint1"),)}, "a coupling of 'panda' has the joints x"),
+        ({"limits": MotionLimits(*[(1.0,)] * 4, 1.0)}, "and limits of motion of 1$"),
     ],
 )
 def test_a_robot_that_cannot_be(change: dict[str, Any], said: str) -> None:
@@ -126,6 +123,20 @@ def test_a_robot_that_cannot_be(change: dict[str, Any], said: str) -> None:
 def test_a_gripper_that_cannot_be(quantity: str) -> None:
     with pytest.raises(SceneError, match="the gripper's"):
         replace(panda().gripper, **{quantity: NAN})
+
+
+def test_what_joins_links_and_joints_and_cannot() -> None:
+    one, two = (1.0,), (1.0, 1.0)
+    for kind, *values in (
+        (Coupling, "a/b", "c"), (Coupling, "a", "c/d"), (Coupling, "a", "a"),
+        (Coupling, "a", "c", NAN), (Coupling, "a", "c", 1.0, NAN), (Closure, "a/b", "c"),
+        (Closure, "a", "c/d"), (Closure, "a", "c", (NAN, 0.0, 0.0)), (Closure, "a", "a"),
+        (Closure, "a", "c", ZERO, one), (Gripper, ("a/b",), 1.0, 0.0, 1.0),
+        (MotionLimits, one, one, one, (0.0,), 1.0), (MotionLimits, one, two, one, one, 1.0),
+        (MotionLimits, one, one, one, one, 0.0),
+    ):  # fmt: skip
+        with pytest.raises(SceneError):
+            kind(*values)
 
 
 def test_numbers_of_numpy_are_numbers() -> None:

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from pytest_simbench.ground.errors import PolicyError
 from pytest_simbench.motion.kinematics import FASTEST, Servo
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.scene import Box, Gripper, Pose, Scene
 from pytest_simbench.scene.policy import Command, Function, LoopError, Policy, Rhythm, as_policy
-from pytest_simbench.scene.set_points import SetPoints, Sight, written
+from pytest_simbench.scene.set_points import SetPoints, Sight, _changed, written
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5), mass=0.1)
 SCENE = Scene("one", (CUBE,), panda())
@@ -100,6 +100,12 @@ def test_the_arm_is_held_against_gravity() -> None:
     assert at.effort.tolist() == [1.0] * 7 + [0.0, 0.0]
 
 
+def test_a_tool_is_moved_and_turned_by_all_that_a_change_says() -> None:
+    tool = _changed(Pose.at(1.0, 2.0, 3.0), np.array([0.1, 0.2, 0.3, 2.5, 0.0, 0.0]))
+    wanted = [1.1, 2.2, 3.3, math.cos(1.25), math.sin(1.25), 0.0, 0.0]
+    assert tool.as_array() == pytest.approx(wanted)
+
+
 @given(st.lists(st.floats(-0.02, 0.02), min_size=6, max_size=6))
 def test_the_tool_goes_by_what_it_is_told(change: list[float]) -> None:
     at = points()
@@ -145,6 +151,7 @@ def test_out_of_reach_the_joints_stay_within_their_limits() -> None:
         (Command(tool=Pose((math.nan, 0.0, 0.0))), "the position of the tool is nan; it must be"),
         (Command(tool=Pose(quaternion=(1.0, 1.0, 0.0, 0.0))), "quaternion of the tool has the len"),
         (Command(gripper=[0.01, 0.02]), r"gripper of shape \(2,\), not one number"),  # type: ignore[arg-type]
+        (Command(gripper="wide"), "answers gripper='wide', which is no number"),  # type: ignore[arg-type]
         (Command(position=START[:7], velocity=START[:7]), "commands position and velocity at once"),
         (Command(tool=(1, 2, 3)), "which is no Pose"),  # type: ignore[arg-type]
         (Command(tool_change=(1, 2, 3)), r"a tool_change of shape \(3,\), not \(6,\)"),
@@ -157,9 +164,19 @@ def test_what_is_no_command_is_told(answer: Any, told: str) -> None:
 
 
 def test_motors_take_efforts_alone() -> None:
-    at = SetPoints(panda().as_motors(), START, np.zeros(9), 0.1)
+    at = SetPoints(panda().as_motors(), START, np.full(9, 2.0), 0.1)
+    assert at.effort.tolist() == [2.0] * 9
     at.after(Command(effort=np.arange(7.0)))
     assert at.effort.tolist() == [*range(7), 0.0, 0.0]
+
+
+def test_a_robot_without_a_hand_is_moved_by_all_its_joints() -> None:
+    bare = replace(panda(), gripper=Gripper((), 0.0, 0.0, 0.0), limits=None, swing=None)
+    at = SetPoints(bare, START, START, 0.1)
+    at.after(Command(position=np.arange(9.0)))
+    assert at.position.tolist() == [*range(9)]
+    with pytest.raises(PolicyError, match="moves the gripper; robot 'panda' has none"):
+        at.after(Command(gripper=0.1))
 
 
 def test_without_a_model_the_tool_is_refused() -> None:

@@ -41,12 +41,6 @@ def test_an_unknown_body_lists_the_known_ones() -> None:
         Scene("s", (box("a", 0.0),)).body("b")
 
 
-def test_free_and_fixed_bodies_keep_their_order() -> None:
-    scene = Scene("s", (box("b", 0.0), Box("t", (1, 1, 0.1), Pose.at(0, 0, -0.05)), box("a", 1.0)))
-    assert [body.name for body in scene.free_bodies] == ["b", "a"]
-    assert [body.name for body in scene.fixed_bodies] == ["t"]
-
-
 def test_pairs_kept_apart_may_be_inside_each_other() -> None:
     bodies = (box("a", 0.0), box("b", 0.01))
     apart = (("body/b", "body/a"), ("ground", "body/a"))

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import importlib
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from pytest_simbench.simulator import lazy_import
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.scene import Box, Pose, Scene, SceneError
+from pytest_simbench.simulator import Seen, Simulator, chosen_on, heavy, lazy_import
+from pytest_simbench.simulator.base import EYE, LOOK_AT, view_axes
+from tests.approval import assert_approved_message
+from tests.worker.hosted import Toy
 
 
 def test_an_engines_function_is_looked_up_once_and_its_state_each_time(
@@ -19,3 +26,32 @@ def test_an_engines_function_is_looked_up_once_and_its_state_each_time(
     assert engine.pi == 3.0
     monkeypatch.delattr(importlib, "import_module")
     assert engine.sqrt(9.0) == 3.0
+
+
+def test_a_world_begins_with_no_steps_and_the_links_that_a_scene_names() -> None:
+    toy, scene = Toy(), Scene("s", robot=panda(), apart=(("ground", "link/panda_link4"),))
+    toy._steps = 5
+    toy.begin(scene)
+    assert (toy.scene, toy.prepared.robot, toy._steps) == (scene, scene.robot, 0)
+    toy.begin(Scene("s"))
+    assert toy.prepared is None
+    with pytest.raises(SceneError, match="no such link"):
+        toy.begin(Scene("s", robot=panda(), apart=(("ground", "link/elbow"),)))
+
+
+def test_what_adapters_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mass far above any body's, the camera's axes, what profiles were chosen on, and that a
+    version is none of the tested ones."""
+    stone = Box("stone", (1.0, 1.0, 1.0), Pose.at(0.0, 0.0, 1.0), 3.0)
+    assert [heavy(Scene("s")), heavy(Scene("s", (stone,)))] == [1e4, 3e4]
+    axes = view_axes()
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert axes.T @ np.subtract(LOOK_AT, EYE) == pytest.approx([0, 0, math.dist(LOOK_AT, EYE)])
+    assert (axes[2, 0], axes[2, 1] < 0.0) == (0.0, True)  # level, and down
+    one, other = (Seen.seeds(name, 1, 2) for name in "ab")
+    tosses = Seen.motions("cube_tosses", 0, 564, 6)
+    assert chosen_on(one, real=(other,)) == {"tuned": (one,), "real": (one, tosses, other)}
+    monkeypatch.setattr(Toy, "info", replace(Toy.info, tested_version="1.2", install="get it"))
+    assert_approved_message(Simulator.untested(Toy()))
+    monkeypatch.setattr(Toy, "versions", lambda self: {"toy": "1.2"})
+    assert Simulator.untested(Toy()) == ""

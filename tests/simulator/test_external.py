@@ -111,6 +111,12 @@ def test_a_program_that_is_not_there(tmp_path: Path) -> None:
         Program("It", ["/nowhere/it"], tmp_path)
 
 
+def test_the_last_words_of_one_that_ends_are_all_it_said(tmp_path: Path) -> None:
+    program = Program("It", ["/bin/sh", "-c", "echo one; sleep 0.1; echo two; exit 3"], tmp_path)
+    with pytest.raises(SimulatorError, match="It exited with status 3 .* words: one two$"):
+        program.wait_until(lambda: False, PATIENCE)
+
+
 @pytest.mark.engine
 def test_exactly_so_many_steps() -> None:
     """The program stands when nobody asks, and what it says is in the log from the start."""

@@ -14,10 +14,10 @@ import pytest
 
 from pytest_simbench import __version__
 from pytest_simbench.scene import Box, Pose, Scene
-from pytest_simbench.simulator import DivergedError, ParityError, StateError
+from pytest_simbench.simulator import ParityError, StateError
 from pytest_simbench.worker import stepping
 from pytest_simbench.worker.server import Server, peak_rss_mb, reset_peak_rss, serve
-from pytest_simbench.worker.wire import LONGEST, pack, unpack
+from pytest_simbench.worker.wire import pack, unpack
 from tests.worker.hosted import Hosted
 
 CUBE = Box("cube", (0.05, 0.05, 0.05), Pose.at(0.5, 0.0, 0.5), mass=0.1)
@@ -172,6 +172,9 @@ def test_what_was_built_is_held_against_the_scene(ask: Asked) -> None:
     ask.construct()
     Hosted.built.update({"body/cube/margin": None})
     assert ask.load()["excused"] == ["body/*/margin: has margins (not told by the engine)"]
+    Hosted.built.update({"body/cube/margin": 0.002})
+    ask.load()
+    assert ask("misfit", names=["cube"]) == 0.002
     Hosted.built.update({"body/cube/mass": 0.2})
     assert ask.error("load", scene=SCENE.to_wire(), parity=True) == (
         "ParityError",
@@ -179,6 +182,7 @@ def test_what_was_built_is_held_against_the_scene(ask: Asked) -> None:
         "hosted 0.2",
     )
     assert ask.load(parity=False)["excused"] == []
+    assert ask("misfit", names=["cube"]) == 0.0
 
 
 def test_a_deviation_of_other_shapes_excuses_nothing(ask: Asked) -> None:
@@ -220,11 +224,12 @@ def test_waiting_and_following(loaded: Asked) -> None:
     assert np.allclose(answer["log"]["time"], [0.02, 0.04])
     assert answer["log"]["bodies"].shape == (2, 1, 13)
     rows = np.zeros((3, 0))
+    loaded("watch", seed=1)
     moved = {"tick": 0.004, "position": rows, "velocity": rows, "effort": rows}
     answer = loaded("follow", **moved, log_period=None)
-    assert set(answer) == {"log", "time", "joints", "bodies"}
+    assert set(answer) == {"log", "aside", "time", "joints", "bodies"}
     assert answer["time"] == pytest.approx(0.048)
-    assert answer["log"] == {}
+    assert (answer["log"], answer["aside"] >= 0.0) == ({}, True)
     assert [call for call in Hosted.calls if call[0] == "command"] == [("command", [], [], [])] * 2
 
 
@@ -254,7 +259,7 @@ def test_a_film_is_of_whole_steps_and_of_the_size_asked_for(loaded: Asked) -> No
     assert loaded("film", period=0.0085, width=4, height=3) == pytest.approx(0.008)
     loaded("wait", duration=0.016, log_period=None)
     frames = [sent["frame"] for sent in loaded.sent if "frame" in sent]
-    assert [frame["time"] for frame in frames] == pytest.approx([0.008, 0.016])
+    assert [one["time"] for one in frames if one["seconds"] > 0.0] == pytest.approx([0.008, 0.016])
     assert [unpack(frame["picture"]).shape for frame in frames] == [(3, 4, 3)] * 2
     loaded.sent.clear()
     assert loaded("film", period=None, width=4, height=3) is None
@@ -348,7 +353,6 @@ class Rude(BaseException):
     ("error", "kind", "message"),
     [
         (ParityError("so"), "ParityError", "so"),
-        (DivergedError("so"), "DivergedError", "so"),
         (Adapters("so"), "StateError", "so"),
         (MemoryError("so"), "MemoryError", "so"),
         (MemoryError(), "MemoryError", "out of memory"),
@@ -356,10 +360,6 @@ class Rude(BaseException):
         (SystemExit(3), "SystemExit", "the adapter called sys.exit(3)"),
         (SystemExit("no"), "SystemExit", "the adapter called sys.exit('no'), status 1"),
         (ValueError("so"), "EngineError", "ValueError: so"),
-        (ValueError(), "EngineError", "ValueError"),
-        (KeyboardInterrupt(), "EngineError", "KeyboardInterrupt"),
-        (KeyboardInterrupt("so"), "EngineError", "KeyboardInterrupt: so"),
-        (GeneratorExit("so"), "EngineError", "GeneratorExit: so"),
         (Rude("so"), "EngineError", "Rude: so"),
         (Mute(), "EngineError", "Mute: (its message cannot be read: RuntimeError)"),
         (Exiting(), "EngineError", "Exiting: (its message cannot be read: SystemExit)"),
@@ -371,11 +371,6 @@ class Rude(BaseException):
             "the adapter called sys.exit('(its message cannot be read: RuntimeError)'), status 1",
         ),
         (ValueError(b"b", {1: 2}, None), "EngineError", "ValueError: (b'b', {1: 2}, None)"),
-        (
-            ValueError("x" * 5000),
-            "EngineError",
-            f"ValueError: {'x' * LONGEST} ... (3000 more characters)",
-        ),
     ],
 )
 def test_every_error_is_an_answer(

@@ -135,24 +135,14 @@ def put(index: Any, value: Any) -> Callable[[Any], Any]:
     ("what", "change", "message"),
     [
         ("joints", lambda q: q[:, :-1], f"{JOINTS}, not float64 (2, 8)"),
-        ("joints", lambda q: q[0], f"{JOINTS}, not float64 (9,)"),
-        ("joints", lambda q: q.T, f"{JOINTS}, not float64 (9, 2)"),
         ("joints", lambda q: q.tolist(), f"{JOINTS}, not a list"),
         ("joints", lambda q: q.astype(np.float32), f"{JOINTS}, not float32 (2, 9)"),
-        ("joints", lambda q: np.zeros_like(q, dtype=int), f"{JOINTS}, not int64 (2, 9)"),
-        ("joints", lambda q: q.astype(object), f"{JOINTS}, not object (2, 9)"),
-        ("joints", lambda q: q.astype(complex), f"{JOINTS}, not complex128 (2, 9)"),
-        ("joints", lambda q: None, f"{JOINTS}, not a NoneType"),
-        ("joints", str, f"{JOINTS}, not a str"),
         ("joints", lambda q: q[:, ORDER], "row 1, 'panda_joint2', starts at (-2.356), where the "
          "scene has (-0.7854); that is the place of 'panda_joint4', so the order is another"),
         ("joints", lambda q: q[:, ::-1].copy(), "row 0, 'panda_joint1', starts at (0.035), where"),
         ("joints", put((0, 4), np.nan), "the state of the joints is not finite after loading"),
         ("bodies", lambda b: b[:-1], f"{BODIES}, not float64 (1, 13)"),
-        ("bodies", lambda b: np.vstack([b, b[:1]]), f"{BODIES}, not float64 (3, 13)"),
-        ("bodies", lambda b: b[:, :7], f"{BODIES}, not float64 (2, 7)"),
         ("bodies", lambda b: b.astype(np.float32), f"{BODIES}, not float32 (2, 13)"),
-        ("bodies", lambda b: b.astype(object), f"{BODIES}, not object (2, 13)"),
         ("bodies", lambda b: b[::-1].copy(), "so the order is another"),
         ("bodies", put((0, 3), np.nan), "must have length 1, but (nan, "),
         ("bodies", put((1, slice(3, 7)), (2.0, 0.0, 0.0, 0.0)), "but (2, 0, 0, 0) has 2"),
@@ -160,9 +150,7 @@ def put(index: Any, value: Any) -> Callable[[Any], Any]:
         ("bodies", lambda b: b[:, [0, 1, 2, 4, 5, 6, 3, 7, 8, 9, 10, 11, 12]], "(w, x, y, z)"),
         ("bodies", put((0, 0), np.inf), "the state of the bodies is not finite after loading"),
         ("bodies", put((1, 7), np.inf), "the state of the bodies is not finite after loading"),
-        ("time", str, "the time must be a float, not '0.0'"),
         ("time", lambda t: None, "the time must be a float, not None"),
-        ("time", complex, "the time must be a float, not 0j"),
         ("time", bool, "the time must be a float, not False"),
         ("time", lambda t: np.array([t]), "the time must be a float, not array([0.])"),
         ("time", lambda t: "0" * 99, f"the time must be a float, not '{'0' * 79}"),
@@ -193,7 +181,7 @@ def test_what_is_no_dict_of_quantities(found: Any, message: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "time", [0.3, 0.25, 100.35, 0.175], ids=["stands", "back", "jumps", "slow"]
+    "time", [0.3, 0.25, 100.35, 0.3509], ids=["stands", "back", "jumps", "fast"]
 )
 def test_a_clock_that_goes_otherwise_than_the_steps(time: float) -> None:
     with pytest.raises(StateError) as caught:

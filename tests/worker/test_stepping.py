@@ -7,9 +7,11 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import (
@@ -139,6 +141,22 @@ def asked(answer: Callable[[], bool]) -> Loop:
     return Loop(20, 20, 0, (row, none, none), 0.04, lambda *_: (row, none) if answer() else None)
 
 
+def test_a_loop_goes_evenly_from_answer_to_answer_as_late_as_declared() -> None:
+    said = iter([(np.array([4.0]), np.array([6.0])), (np.array([0.0]), np.array([7.0])), None])
+    seen: list[tuple[Any, ...]] = []
+    start = np.array([1.0]), np.array([9.0]), np.array([5.0])  # its velocity is not gone on with
+    loop = Loop(2, 3, 1, start, 0.1, lambda *now: seen.append(now) or next(said))  # type: ignore[func-returns-value]
+    rows, steps, more = loop.rows(), [], True
+    for k in range(3):
+        more = more and loop.ask(0.1 * k, np.full((2, 1), k), np.full((1, 13), k))
+        steps += [np.ravel(next(rows)).tolist() for _ in range(2) if more]
+    assert (loop.steps, more) == (6, False)
+    assert steps == [[1.0, 0.0, 5.0], [2.5, 30.0, 6.0], [4.0, 30.0, 6.0], [2.0, -40.0, 7.0]]
+    for k, (now, joints, told, bodies) in enumerate(seen):  # what is in force is that of `steps`
+        assert (now, joints[1, 0], bodies[0, 0]) == (0.1 * k, k, k)
+        assert np.ravel(told).tolist() == [[1.0, 0.0, 5.0], *steps[1::2]][k]
+
+
 def test_a_question_is_no_time_of_the_steps_also_where_the_policy_ends_it() -> None:
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as alone:
         burnt, wall, clocks = alone.submit(_ask_thrice).result()
@@ -207,7 +225,7 @@ def test_each_step_gets_its_own_command_and_a_wait_none() -> None:
     assert [c.ravel().tolist() for c in toy.commands] == [
         [k, 10.0 * k, 100.0 * k] for k in (1.0, 2.0, 3.0, 4.0, 5.0)
     ]
-    assert toy.steps == 5
+    assert (toy.steps, np.ravel(stepper.told).tolist()) == (5, [5.0, 50.0, 500.0])
     stepper.wait(0.01, None)
     assert (len(toy.commands), toy.steps) == (5, 10)
     stepper.wait(0.0, None)
@@ -323,10 +341,7 @@ def told(scene: Scene, steps: int) -> Told:
     acting = Acting.of(simulator, scene)
     simulator.pushed.clear()
     simulator.led.clear()
-    act = acting.steps()
-    for _ in range(steps):
-        act()
-        simulator.step()
+    Stepper(simulator, scene, lambda at: None, acting).wait(0.002 * steps, None)
     return simulator
 
 
@@ -343,14 +358,6 @@ def test_a_force_from_the_start_on_is_not_told_before_the_first_step() -> None:
     assert simulator.pushed == [0.0]
 
 
-def test_it_is_told_in_each_step_of_a_wait() -> None:
-    simulator = Told()
-    acting = Acting.of(simulator, PULLED)
-    simulator.pushed.clear()
-    Stepper(simulator, PULLED, lambda at: None, acting).wait(0.016, None)
-    assert simulator.pushed == pytest.approx([0.0, 0.5, 1.0, 0.5, 0.0])
-
-
 def test_a_motion_goes_on_from_the_simulators_time() -> None:
     simulator = Told()
     acting = Acting.of(simulator, Scene("s", (BELT,)))
@@ -364,9 +371,7 @@ def test_a_motion_goes_on_from_the_simulators_time() -> None:
 
 
 def test_where_nothing_acts_nobody_is_told() -> None:
-    assert (
-        Acting.of(Toy(), Scene("s", (Box("a", (0.1,) * 3, Pose.at(0.0, 0.0, 1.0), 1.0),))) is None
-    )
+    assert Acting.of(Toy(), Scene("s", (CUBE,))) is None
 
 
 @pytest.mark.parametrize(
@@ -390,6 +395,8 @@ def test_a_prescribed_body_is_neither_free_of_its_motion_nor_fixed() -> None:
 
 def test_a_turn_about_any_axis_keeps_the_quaternion_a_unit() -> None:
     row = prescribed(BELT.changed(angular_velocity=(0.3, -1.0, 2.0)), 7.3)
+    turn = Rotation.from_rotvec(7.3 * np.array([0.3, -1.0, 2.0])).as_matrix()
+    assert Pose.from_array(row).rotation() == pytest.approx(turn)
     assert np.linalg.norm(row[3:7]) == pytest.approx(1.0)
 
 
