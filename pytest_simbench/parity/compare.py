@@ -162,8 +162,10 @@ class Lasting:
             )
 
     def _same(self, name: str, value: Any) -> bool:
-        first = self._first.get(name)  # of what was not told None: as a number nan, equal to none
-        if _equal(name, first, value):
+        first = self._first.get(name)
+        if first is None or value is None:
+            return False
+        if np.array_equal(first, value) or _equal(name, first, value):
             return True
         gap = _gap(first, value) if name.rpartition("/")[2] in OUTLINES else None
         error = max((d.within or 0.0 for d in self._deviations if d.excuses(name)), default=0.0)
