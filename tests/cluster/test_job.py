@@ -45,12 +45,14 @@ def of_node(experiment: Experiment, asked: str) -> str:
     return out.decode().strip()
 
 
+@pytest.mark.engine
 def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
     """The node has neither the test nor what its class is derived from."""
     asked = "task, [metric.name for metric in task.metrics]"
     assert of_node(Experiment(case, Falling(0.25)), asked) == "Falling(duration=0.25) ['landed']"
 
 
+@pytest.mark.engine
 @pytest.mark.parametrize("name", ["still", "wrapped"])
 def test_so_does_the_policy_of_a_file(case: Case, tmp_path: Path, name: str) -> None:
     path = tmp_path / "mine.py"

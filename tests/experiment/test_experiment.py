@@ -37,6 +37,7 @@ def test_a_robot_whose_file_was_changed_is_another_one(tmp_path: Path) -> None:
     assert describe_robot(find(str(file))) == describe_robot(before) != first
 
 
+@pytest.mark.engine
 def test_the_version_is_chosen_once_whatever_becomes_of_the_case(case: Case) -> None:
     experiment = Experiment(replace(case, protocol=PROTOCOLS["smoke"]), Halved(duration=0.4))
     again = experiment.in_case(attempt=2).in_case(contended=True)
@@ -99,6 +100,7 @@ class Versions(Falling):
         return replace(self, version="the study's")
 
 
+@pytest.mark.engine
 def test_paper_runs_in_real_time_and_records_before(case: Case) -> None:
     paper = replace(PROTOCOLS["paper"], before=1.0)
     record, error = Repetition(
@@ -112,6 +114,7 @@ def test_paper_runs_in_real_time_and_records_before(case: Case) -> None:
     assert record.stepping["wall"] < 0.5  # waiting for the clock is not the simulator's time
 
 
+@pytest.mark.engine
 def test_phases_follow_each_other(case: Case) -> None:
     phases: list[str] = []
     Repetition(Experiment(case, Falling()), 1, hooks=Hooks(phase=phases.append)).run()
@@ -120,6 +123,7 @@ def test_phases_follow_each_other(case: Case) -> None:
     ]
 
 
+@pytest.mark.engine
 def test_fast_does_not_wait(case: Case) -> None:
     record, _ = Repetition(Experiment(case, Falling(duration=100.0)), 1).run()
     assert record.timeline["end"] - record.timeline["start"] < 50.0
@@ -138,6 +142,7 @@ def test_each_protocol_has_its_version_of_a_task(case: Case) -> None:
     assert all(version(name, tiny) == tiny for name in PROTOCOLS)
 
 
+@pytest.mark.engine
 def test_a_record_says_what_it_was(case: Case) -> None:
     case = replace(case, changes={"timestep": "0.002"}, seed=7, jitter=0.5)
     record, _ = Repetition(Experiment(case, Falling()), 3).run()

@@ -32,6 +32,7 @@ from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import Pose, Robot, Scene
 from pytest_simbench.tasks.base import cube
+from tests.approval import assert_approved_line
 from tests.hostile import assert_harmless_terminal
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
@@ -164,6 +165,7 @@ def changed(path: Path, *keys: Any, to: Any) -> Path:
     return path
 
 
+@pytest.mark.engine
 def test_what_a_file_says_of_starting_is_not_looked_at(
     path: Path, case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -204,6 +206,7 @@ def test_what_a_file_says_of_starting_is_not_looked_at(
     assert not (tmp_path / "there").exists()
 
 
+@pytest.mark.engine
 def test_another_version_is_said(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(path)]) == 0
     note, result, _ = capsys.readouterr().out.splitlines()
@@ -217,9 +220,10 @@ def test_a_built_in_robot_is_this_machine_s(case: Case, tmp_path: Path, robot: R
     assert "/" not in json.dumps(json.loads(path.read_text())["scene"])  # no path of ours
     for key, value in (("urdf", "/etc/passwd"), ("packages", {"x": "/"}), ("srdf", "/dev/zero")):
         changed(path, "scene", "robot", key, to=value)
-    assert read_example(path, tmp_path).scene.robot == robot
+    assert read_example(path, tmp_path, python="p").scene.robot == robot
 
 
+@pytest.mark.engine
 def test_a_robot_of_unknown_files_needs_a_word(
     case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -243,6 +247,7 @@ def test_the_line_says_how_it_was_started_here(case: Case, tmp_path: Path) -> No
     assert replay_command(path, own, SCENE).endswith(" --spec=ssh=there//python=py")
 
 
+@pytest.mark.engine
 def test_another_interpreter_is_the_user_s_to_name(
     path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -295,11 +300,12 @@ BROKEN: list[tuple[tuple[Any, ...], Any, str]] = [
 def test_something_else_in_it_is_a_sentence(
     path: Path, keys: tuple[Any, ...], value: Any, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["replay", str(changed(path, *keys, to=value))]) == 2
+    assert main(["replay", str(changed(path, *keys, to=value)), "--python=p"]) == 2
     told = capsys.readouterr().err
     assert said in told
     assert told.startswith(f"simbench replay: {path}")
     assert told.count("\n") == 1
+    assert_approved_line("episodes", told.partition(f"{path}")[2].strip())
     assert_harmless_terminal(told)
 
 
@@ -322,6 +328,7 @@ def test_a_motion_that_is_none(case: Case, tmp_path: Path, rows: Any, said: str)
         motion["effort"] = rows[:1]
     wrong = [Operation("follow", {"tick": 0.1, **motion})]
     path = write_example(case, "motion", replace(SCENE, robot=panda()), wrong)
+    path = path.rename(tmp_path / "motion.json")
     with pytest.raises(ExampleError, match=said):
         read_example(path, tmp_path)
 
@@ -391,7 +398,7 @@ def test_a_worker_that_fails_is_a_sentence(
         raise EngineFailed(f"no {EVIL}", Where("mujoco", "headless"))
 
     monkeypatch.setattr("pytest_simbench.repeatability.example._replay", fails)
-    assert main(["replay", str(path)]) == 1
+    assert main(["replay", str(path), "--python=p"]) == 1
     told = capsys.readouterr().err
     assert told.startswith(r"no \x1b]0;owned")
     assert_harmless_terminal(told)

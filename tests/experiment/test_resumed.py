@@ -96,6 +96,7 @@ def test_the_tasks_parameters_and_scene_are_compared(case: Case, save: Save) -> 
         )
 
 
+@pytest.mark.engine
 @pytest.mark.parametrize("name", ["mujoco", "pytest-simbench", "python"])
 def test_versions_that_are_known_here_are_compared(case: Case, save: Save, name: str) -> None:
     versions = expected(Experiment(case, Falling())).versions
@@ -157,6 +158,7 @@ def test_records_of_before_scene_and_limits_were_kept_go_on(case: Case, save: Sa
     assert len(save(*old).take(Experiment(case, Falling()), None)) == 1
 
 
+@pytest.mark.engine
 def test_expected_is_what_the_worker_reports(case: Case) -> None:
     from pytest_simbench.experiment.repetition import Repetition
 
@@ -168,6 +170,7 @@ def test_expected_is_what_the_worker_reports(case: Case) -> None:
         assert record.to_dict()[name] == now[name]
 
 
+@pytest.mark.engine
 def test_a_start_that_fails_still_records_its_settings(case: Case) -> None:
     from pytest_simbench.experiment.repetition import Repetition
 
@@ -181,6 +184,7 @@ def test_a_start_that_fails_still_records_its_settings(case: Case) -> None:
     )
 
 
+@pytest.mark.engine
 def test_a_time_out_failed_and_is_not_run_again(case: Case, save: Save) -> None:
     from pytest_simbench.experiment.repetition import Repetition
 
