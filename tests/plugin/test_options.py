@@ -120,14 +120,6 @@ def test_ini_flags(pytester: pytest.Pytester, name: str, word: str, value: bool)
     assert options.value(pytester.parseconfig("-o", f"{name}={word}"), name) is value
 
 
-def test_jobs_auto_takes_the_cores_that_pytest_may_use(
-    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("os.sched_getaffinity", lambda pid: {0, 1, 3})
-    assert options.value(pytester.parseconfig("--sim-jobs=auto"), "sim_jobs") == 3
-    assert options.value(pytester.parseconfig("-o", "sim_jobs=auto"), "sim_jobs") == 3
-
-
 @pytest.mark.parametrize("option", [o for o in OPTIONS if o.long], ids=lambda o: o.flag)
 def test_the_sure_name_is_the_same_option(pytester: pytest.Pytester, option: Option) -> None:
     words = {"--sim": "mujoco", "--robot": "ur5", "--reps": "3", "--protocol": "smoke"}
