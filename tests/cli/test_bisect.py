@@ -11,6 +11,7 @@ from pytest_simbench.cli import bisect
 from pytest_simbench.cli.values import Span
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunFolder
+from tests.approval import assert_approved_line
 from tests.cli.test_bisect_ends import RELEASES, Recorded
 from tests.records.build import METRICS, failed, record
 
@@ -49,4 +50,5 @@ def test_what_the_repetitions_show(
     status = bisect.bisect(Span("sim", "1.8", "1.12"), "landing_error", tmp_path, [])
     told = capsys.readouterr().out
     assert said in told
+    assert_approved_line("bisect", told.replace(f"{tmp_path}", "DIR").replace("\n", " | "))
     assert status == (FOUND not in told)

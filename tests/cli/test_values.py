@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ast import literal_eval
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,9 @@ READ: list[tuple[Callable[[str], Any], dict[str, Any], tuple[str, ...]]] = [
     (Number(0, 2.5), {" 2.5 ": 2.5, "+0": 0, ".5e0": 0.5, "0" * 30: 0},
      ("-.1", "2.6", "x", "1e999", "0" * 31, "1e", "")),
     (Number(1, 12, whole=True), {"12": 12, "1": 1}, ("13", "0", "1.0")),
+    (lambda text: values.SEED.check(literal_eval(text)), {"7": 7}, ("1.0", "True", "'1'")),
+    (lambda text: values.SHARE.check(literal_eval(text), text), {"1": 1, ".5": 0.5},
+     ("True", "1e999", "None")),
     (values.repetitions, {"auto": Auto(160), " auto:7": Auto(7), "3": 3, "100000": 100_000},
      ("auto:", "auto:x", "0", "100001", "3:4")),
     (values.jobs, {" auto ": 3, "256": 256}, ("0", "257", "many")),

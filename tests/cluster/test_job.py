@@ -45,7 +45,6 @@ def of_node(experiment: Experiment, asked: str) -> str:
     return out.decode().strip()
 
 
-@pytest.mark.engine
 def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
     """The node has neither the test nor what its class is derived from."""
     asked = "task, [metric.name for metric in task.metrics]"
