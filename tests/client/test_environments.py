@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
+import platform
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from urllib.request import Request
 
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
@@ -326,6 +330,23 @@ def test_an_index_that_does_not_answer_is_one_sentence(monkeypatch: pytest.Monke
         releases("engine")
 
 
+def test_a_name_and_a_password_are_no_part_of_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    def answer(request: Request, timeout: float) -> io.BytesIO:
+        asked.append((request.full_url, request.headers))
+        return io.BytesIO(PAGE.encode())
+
+    monkeypatch.setattr("urllib.request.urlopen", answer)
+    monkeypatch.setenv("PIP_INDEX_URL", "https://me%40x:p%2Fw@host:8/simple/")
+    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", "https://me@host")
+    assert releases("En_gine") == ["1.9.0", "1.10.0"]
+    for secret, url in ((b"me@x:p/w", "https://host:8/simple/"), (b"me:", "https://host/")):
+        basic = f"Basic {base64.b64encode(secret).decode()}"
+        told = {"Accept": "text/html", "Authorization": basic}
+        assert asked.pop(0) == (f"{url}en-gine/", told)
+
+
 def test_the_last_of_each_minor_version() -> None:
     assert newest_of_minors(["3.10.0", "3.2.0", "3.2.7", "3.9.0"]) == ["3.2.7", "3.9.0", "3.10.0"]
 
@@ -342,5 +363,12 @@ def test_the_nearest_releases(version: str, near: list[str]) -> None:
 def test_no_release_is_one_sentence() -> None:
     assert unreleased("engine", "3.0.0", ["3.0", "3.1"]) == ""
     assert unreleased("engine", "4.0rc1", ["3.0"]) == ""  # whoever asks for one may have it
-    assert "nearest releases are 3.0, 3.1" in unreleased("engine", "3.9", ["3.0", "3.1"])
-    assert "'abc' is no version" in unreleased("engine", "abc", ["3.0"])
+    assert unreleased("engine", "3.0+cu12", ["3.1"]) == ""
+    python = ".".join(platform.python_version_tuple()[:2])
+    assert unreleased("engine", "3.9", map(str, range(6))) == (
+        f"the package index has no engine 3.9 for Python {python}; the nearest releases are "
+        "2, 3, 4, 5"
+    )
+    assert unreleased("engine", "abc", map(str, range(6))) == (
+        "'abc' is no version; the newest releases are 2, 3, 4, 5"
+    )
