@@ -43,21 +43,15 @@ def test_the_first_release_that_ends_elsewhere(
 
 
 @pytest.mark.parametrize(
-    ("last", "moved", "said"),
-    [
-        (30.5, 40.0, ("the scene's own noise", "so 1.10 is not shown to be the cause\n")),
-        (30.5, None, ("No moved start was tried", "so 1.10 is not shown to be the cause\n")),
-        (0.9, None, ("1.8 and 1.12 end alike, within 1 mm\n",)),  # what lies between is not asked
-    ],
+    ("last", "moved"),
+    [(30.5, 40.0), (30.5, None), (0.9, None)],  # of the last what lies between is not asked
 )
 def test_what_has_no_cause(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], last: float, moved: float | None,
-    said: tuple[str, ...],
-) -> None:  # fmt: skip
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], last: float, moved: float | None
+) -> None:
     assert bisect_ends(search(tmp_path, 0.0, 0.4, 30.0, 31.0, last, moved=moved)) == 1
-    told = capsys.readouterr().out
-    assert all(part in told for part in said)
-    assert_approved_line("bisect", told.replace(f"{tmp_path}", "DIR").replace("\n", " | "))
+    told = capsys.readouterr().out.replace(f"{tmp_path}", "DIR")
+    assert_approved_line("bisect", told.replace("\n", " | "))
     assert ("first release" in told) == (last > 1)
 
 

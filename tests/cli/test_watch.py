@@ -117,17 +117,12 @@ def test_the_first_watch_notes_the_newest_and_the_next_begins_there(
 
 
 @pytest.mark.parametrize(
-    ("words", "status", "ran", "told"),
+    ("words", "status", "ran"),
     [
-        ("--since mujoco==3.2.7:minor", 1, ["3.2.7", "3.3.7", "4.0.0"], "after 3.2.7 came 3.3.7"),
-        ("--since mujoco==3.2.7", 2, RELEASES[1:], "mujoco could not be judged: the run ended"),
-        (
-            "mujoco --since mujoco==3.3.7 --reps 3 --scene a.xml --output out",
-            1,
-            ["3.3.7", "4.0.0"],
-            "mujoco 4.0.0, after 3.3.7",
-        ),
-        ("--since mujoco==4.0.0", 0, None, "mujoco: nothing came after 4.0.0"),
+        ("--since mujoco==3.2.7:minor", 1, ["3.2.7", "3.3.7", "4.0.0"]),
+        ("--since mujoco==3.2.7", 2, RELEASES[1:]),
+        ("mujoco --since mujoco==3.3.7 --reps 3 --scene a.xml --output out", 1, ["3.3.7", "4.0.0"]),
+        ("--since mujoco==4.0.0", 0, None),
     ],
 )
 def test_a_watch_may_begin_earlier(
@@ -136,14 +131,11 @@ def test_a_watch_may_begin_earlier(
     words: str,
     status: int,
     ran: list[str] | None,
-    told: str,
 ) -> None:
     Path("a.xml").touch()
     assert main(["watch", *words.split()]) == status
     assert work == ([ran] if ran else [])
-    found = "".join(capsys.readouterr())
-    assert told in found
-    assert_approved_line("watch", found.replace("\n", " | "))
+    assert_approved_line("watch", capsys.readouterr().out.replace("\n", " | "))
 
 
 def test_one_that_cannot_be_judged_holds_up_no_other(
@@ -157,6 +149,4 @@ def test_one_that_cannot_be_judged_holds_up_no_other(
     monkeypatch.setattr(watch, "releases", of)
     assert main(["watch", "sapien", "mujoco"]) == 2
     assert main(["watch", "sapien", "--since", "mujoco==3.3.7"]) == 1
-    told = capsys.readouterr().out
-    assert "sapien could not be judged: no package index tells" in told
-    assert_approved_line("watch", told.replace("\n", " | "))
+    assert_approved_line("watch", capsys.readouterr().out.replace("\n", " | "))

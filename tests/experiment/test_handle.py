@@ -19,9 +19,11 @@ from hypothesis.errors import UnsatisfiedAssumption
 from pytest_simbench.cli.main import main
 from pytest_simbench.client.errors import WorkerExited
 from pytest_simbench.client.tape import Operation
+from pytest_simbench.experiment import example
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.example import (
     LARGEST,
+    Example,
     ExampleError,
     read_example,
     replay_command,
@@ -152,7 +154,8 @@ EVIL = "\x1b]0;owned\x07\x1b[2Jred\r\u202e"
 
 @pytest.fixture
 def path(case: Case) -> Path:
-    return write_example(case, "episode", SCENE, TAPE, {"mujoco": "3.0.0"})
+    path = write_example(case, "episode", SCENE, TAPE, {"mujoco": "3.0.0"})
+    return path.rename(case.folder / "episode.json")
 
 
 def changed(path: Path, *keys: Any, to: Any) -> Path:
@@ -206,6 +209,32 @@ def test_what_a_file_says_of_starting_is_not_looked_at(
     assert not (tmp_path / "there").exists()
 
 
+def test_this_machine_says_how_it_is_run(
+    path: Path, case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own: dict[str, Any] = {"mode": "gui", "python": "p", "spec": "s"}
+    found = read_example(path, tmp_path / "logs", **own)
+    known = Case.of("mujoco", test=case.test, profile="tuned", folder=tmp_path / "logs", **own)
+    assert found == Example(known, SCENE, TAPE, {"mujoco": "3.0.0"})
+    monkeypatch.setattr(example, "missing", lambda info: f"no {info.name} here")
+    with pytest.raises(ExampleError, match="no mujoco here"):
+        read_example(path, tmp_path)
+
+
+def test_one_of_the_same_test_and_name_is_replaced(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paths = []
+    for name, running, of in (
+        ("a", "t (setup)", "x"), ("a", "t (call)", "x"),
+        ("b", "t (call)", "x"), ("a", "u (call)", "x"), ("a", "t (call)", "y"),
+    ):  # fmt: skip
+        monkeypatch.setenv("PYTEST_CURRENT_TEST", running)
+        paths.append(write_example(replace(case, test=of), name, SCENE, []))
+    assert len(set(paths[:2])) == 1
+    assert len(set(paths)) == 4
+
+
 @pytest.mark.engine
 def test_another_version_is_said(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(path)]) == 0
@@ -223,7 +252,6 @@ def test_a_built_in_robot_is_this_machine_s(case: Case, tmp_path: Path, robot: R
     assert read_example(path, tmp_path, python="p").scene.robot == robot
 
 
-@pytest.mark.engine
 def test_a_robot_of_unknown_files_needs_a_word(
     case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -234,9 +262,9 @@ def test_a_robot_of_unknown_files_needs_a_word(
         "robot 'mine' is not known here (known: panda, so101, ur10, ur5, xarm7)"
         in capsys.readouterr().err
     )
-    assert read_example(path, tmp_path, trust_robot=True).scene == scene
+    assert read_example(path, tmp_path, python="p", trust_robot=True).scene == scene
     assert replay_command(path, case, scene).endswith(f"{path.name} --trust-robot")
-    assert main(["replay", str(path), "--trust-robot"]) == 0
+    assert main(["replay", str(path), "--trust-robot", "--python=/nowhere/python"]) == 1
 
 
 def test_the_line_says_how_it_was_started_here(case: Case, tmp_path: Path) -> None:
