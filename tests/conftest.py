@@ -137,7 +137,7 @@ SLOW = {
 ENGINE_FIXTURES = {"case", "handle", "machines", "pytester"}
 """Of tests that run MuJoCo, pytest with simulators, or a cluster of them."""
 
-UNRUN = {"test_experiment.py", "test_handle.py", "test_job.py", "test_resumed.py"}
+UNRUN = {"experiment", "handle", "job", "resumed", "scripted"}
 """Files in which a `case` is for reading: who runs one has the mark there."""
 
 
@@ -156,7 +156,7 @@ def pytest_itemcollected(item: pytest.Item) -> None:
     """
     fixtures = set(getattr(item, "fixturenames", ()))
     rooms = set(item.path.relative_to(Path(__file__).parent).parts)
-    fixtures -= {"case"} if item.path.name in UNRUN else set()
+    fixtures -= {"case"} if item.path.stem[5:] in UNRUN else set()
     if rooms & ENGINE_ROOMS or item.path.name == "test_browser.py" or fixtures & ENGINE_FIXTURES:
         item.add_marker("engine")
 
