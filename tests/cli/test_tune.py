@@ -112,7 +112,7 @@ def test_all_that_is_said_of_a_search(tmp_path: Path, capsys: pytest.CaptureFixt
     half = replace(better.judgement, worse_by=None, cheaper=Interval(2.0, 1.5, 2.5, 60, "t"))
     vars(law)["judgement"] = half
     lines = [capsys.readouterr().out, *together((better, unknown, kept))]
-    for of in (better, unknown, kept, law):
+    for of in (better, unknown, kept, law, replace(kept, done=[today])):
         lines += [*front_of(of), *verdict_of(of)]
     assert_approved("tune", "\n".join(lines))
 

@@ -144,16 +144,12 @@ def test_each_protocol_has_its_version_of_a_task(case: Case) -> None:
 
 @pytest.mark.engine
 def test_a_record_says_what_it_was(case: Case) -> None:
-    case = replace(case, changes={"timestep": "0.002"}, seed=7, jitter=0.5)
+    case = replace(case, changes={"timestep": "0.002"})
     record, _ = Repetition(Experiment(case, Falling()), 3).run()
-    assert (record.seed, record.repetition, record.jitter) == (9, 3, 0.5)
     assert record.settings["timestep"] == 0.002
-    assert record.settings["task.duration"] == 0.6
     assert {"mujoco", "python", "pytest-simbench"} <= set(record.versions)
     assert record.stepping["simulated"] == pytest.approx(0.6)
     assert record.resources["rss_mb"]["peak"] > 20
-    kinds = ("launch", "compile", "load", "plan", "policy", "step", "other", "total")
-    assert set(record.seconds) == set(kinds)
     assert record.notes.log.startswith("logs/")
 
 
