@@ -18,14 +18,10 @@ from tests.records.build import METRICS, failed, record
 
 @pytest.mark.parametrize(
     ("errors", "noise"),
-    [
-        ((0.1, 0.1, None, 0.5, 0.5), 0.0),
-        ((0.1, 0.1, "crashed", 0.5, 0.5), 0.0),
-        ((0.1, 0.1, 0.7, 0.5, 0.5), 0.0),
-        ((0.1, 0.2, 0.31, 0.4, 0.5), 0.15),
-        ((0.1, 0.1, 0.1, 0.1, 0.1 + 1e-9), 0.0),
-    ],
-)
+    [((0.1, 0.1, None, 0.5, 0.5), 0.0), ((0.1, 0.1, "crashed", 0.5, 0.5), 0.0),
+     ((0.1, 0.1, 0.7, 0.5, 0.5), 0.0), ((0.1, 0.2, 0.31, 0.4, 0.5), 0.15),
+     ((0.1, 0.1, 0.1, 0.1, 0.1 + 1e-9), 0.0)],
+)  # fmt: skip
 def test_what_the_repetitions_show(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
