@@ -29,7 +29,7 @@ def test_a_file_is_read_once_until_it_changes(
     assert read_scene_file(path).scene.body("block")
 
 
-@pytest.mark.parametrize("name", ["a.usd", "a.sdf", "a.txt", "a.xml"])
+@pytest.mark.parametrize("name", ["a.usd", "a.sdf", "a.txt", "a.urdf"])
 def test_files_that_nobody_reads_are_told(tmp_path: Path, name: str) -> None:
     with pytest.raises(DescriptionError, match=name):
         read_scene_file(tmp_path / name)
