@@ -5,17 +5,21 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
+from unittest.mock import Mock, call
 
 import pytest
 
 from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.identity import describe_robot
+from pytest_simbench.experiment.identity import describe_robot, expected
+from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.repetition import Hooks, Repetition, group
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.laws.free import FreeFall
 from pytest_simbench.motion.registry import find
+from pytest_simbench.records.record import Record
 from pytest_simbench.tasks.base import Task
+from tests.made_up import MadeUp
 from tests.motion.small_arm import small_arm
 from tests.tiny import Falling
 
@@ -127,6 +131,20 @@ def test_phases_follow_each_other(case: Case) -> None:
 def test_fast_does_not_wait(case: Case) -> None:
     record, _ = Repetition(Experiment(case, Falling(duration=100.0)), 1).run()
     assert record.timeline["end"] - record.timeline["start"] < 50.0
+
+
+def test_the_live_line_is_told_of_each_repetition(case: Case) -> None:
+    line, kept = Mock(), list[Record]()
+    ok = {"status": "ok", "metrics": {"landed": 1.0}}
+    worker = MadeUp(1, lambda experiment, number: (ok, None))
+    repeater = Repeater(Experiment(case, Falling()), worker, line, kept.append, line.begin)
+    found = {2: expected(repeater.experiment, 2)}
+    assert repeater.up_to(3, found) == [kept[0], found[2], kept[1]]
+    assert line.mock_calls == [
+        call.begin(), call.start_test("test_x[mujoco-headless]", 2, 3),
+        call.repetition(1, 10001, ""), call.end_repetition("ok", 1.0),
+        call.repetition(3, 10003, ""), call.end_repetition("ok", 1.0), call.end_test(),
+    ]  # fmt: skip
 
 
 def test_each_protocol_has_its_version_of_a_task(case: Case) -> None:

@@ -321,27 +321,21 @@ def test_something_else_in_it_is_a_sentence(
     assert_harmless_terminal(told)
 
 
-@pytest.mark.parametrize(
-    ("rows", "said"),
-    [
-        ([[0.0] * 8], "is no array of 9 joints"),
-        ([[0.0] * 9, [0.0]], "is no array of 9 joints"),
-        ([["x"] * 9], "is no array of 9 joints"),
-        ([[None] * 9], "is no array of 9 joints"),
-        ([], "is no array of 9 joints"),
-        ([[0.0] * 9] * 2, "have several lengths"),
-        ([[0.0] * 9] * 10_000, "a motion lasts longer than 600 s"),
-    ],
-    ids=["joints", "ragged", "texts", "none", "empty", "lengths", "long"],
-)
-def test_a_motion_that_is_none(case: Case, tmp_path: Path, rows: Any, said: str) -> None:
-    motion = dict.fromkeys(("position", "velocity", "effort"), rows)
-    if said.endswith("lengths"):
-        motion["effort"] = rows[:1]
+MOTIONS = {
+    "joints": [[0.0] * 8], "ragged": [[0.0] * 9, [0.0]], "texts": [["x"] * 9], "none": [[None] * 9],
+    "empty": [], "lengths": [[0.0] * 9] * 2, "long": [[0.0] * 9] * 10_000,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", MOTIONS)
+def test_a_motion_that_is_none(case: Case, tmp_path: Path, what: str) -> None:
+    motion: dict[str, Any] = dict.fromkeys(ARRAYS, MOTIONS[what])
+    if what == "lengths":
+        motion["effort"] = motion["effort"][:1]
     wrong = [Operation("follow", {"tick": 0.1, **motion})]
     path = write_example(case, "motion", replace(SCENE, robot=panda()), wrong)
-    path = path.rename(tmp_path / "motion.json")
-    with pytest.raises(ExampleError, match=said):
+    path = path.rename(tmp_path / f"{what}.json")
+    with pytest.raises(ExampleError, match="motion"):
         read_example(path, tmp_path)
 
 
