@@ -138,15 +138,10 @@ def drawn(kind: str, *shape: int, seconds: float = 2.0) -> dict[str, Any]:
 
 @pytest.mark.parametrize(
     ("data", "came"),
-    [
-        (None, "None"),
-        ("x" * 99, "'" + "x" * 79),
-        ({"time": 1, "seconds": 2}, "{'time': 1, 'seconds': 2}"),
-        (drawn("u1", 2, 2), "uint8 (2, 2)"),
-        (drawn("f8", 36, 48, 3), "float64 (36, 48, 3)"),
-    ],
-)
-def test_what_is_no_picture_is_a_problem(data: Any, came: str) -> None:
+    [(None, "None"), ("x" * 99, "'" + "x" * 79), ({"time": 1, "seconds": 2},) * 2,
+     (drawn("u1", 2, 2), "uint8 (2, 2)"), (drawn("f8", 36, 48, 3), "float64 (36, 48, 3)")],
+)  # fmt: skip
+def test_what_is_no_picture_is_a_problem(data: Any, came: object) -> None:
     told = f"the engine drew what is no picture of (48, 36): {came}"
     assert Frame.from_wire(data, SIZE) == Frame(0.0, None, told, 0.0)
 

@@ -59,14 +59,9 @@ def test_seeds_count_on_from_the_case_s(case: Case) -> None:
 
 @pytest.mark.parametrize(
     ("deterministic", "task", "asked", "done"),
-    [
-        (True, FreeFall(), 20, 1),
-        (True, FreeFall(), None, 1),
-        (False, FreeFall(), 3, 3),
-        (True, Falling(), 3, 3),
-        (True, Falling(), None, 20),
-    ],
-)
+    [(True, FreeFall(), 20, 1), (True, FreeFall(), None, 1), (False, FreeFall(), 3, 3),
+     (True, Falling(), 3, 3), (True, Falling(), None, 20)],
+)  # fmt: skip
 def test_what_draws_nothing_is_done_once_where_it_would_be_the_same(
     case: Case, deterministic: bool, task: Task, asked: int | None, done: int
 ) -> None:
