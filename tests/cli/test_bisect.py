@@ -23,12 +23,9 @@ from tests.records.build import METRICS, failed, record
      ((0.1, 0.1, 0.1, 0.1, 0.1 + 1e-9), 0.0)],
 )  # fmt: skip
 def test_what_the_repetitions_show(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    errors: tuple[Any, ...],
-    noise: float,
-) -> None:
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    errors: tuple[Any, ...], noise: float,
+) -> None:  # fmt: skip
     monkeypatch.setattr(bisect, "Search", Recorded)
     monkeypatch.setattr(bisect, "_releases", lambda wanted: RELEASES)
     run = RunFolder(tmp_path)

@@ -126,12 +126,9 @@ def test_the_first_watch_notes_the_newest_and_the_next_begins_there(
     ],
 )
 def test_a_watch_may_begin_earlier(
-    work: list[list[str]],
-    capsys: pytest.CaptureFixture[str],
-    words: str,
-    status: int,
-    ran: list[str] | None,
-) -> None:
+    work: list[list[str]], capsys: pytest.CaptureFixture[str],
+    words: str, status: int, ran: list[str] | None,
+) -> None:  # fmt: skip
     Path("a.xml").touch()
     assert main(["watch", *words.split()]) == status
     assert work == ([ran] if ran else [])

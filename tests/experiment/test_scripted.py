@@ -17,7 +17,8 @@ from pytest_simbench.experiment.repetition import Hooks, Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.scene import Pose
 from pytest_simbench.tasks import Jitter, LeaningTowers, Stacking, Task, Throwing
-from tests.approval import assert_approved
+from pytest_simbench.tasks.base import Outcome
+from tests.approval import assert_approved, assert_approved_line
 from tests.tasks.scripted import Effect, Mishap, ScriptedProcess, fail, move, put, stacked
 
 TOWERS = LeaningTowers(margins=(0.01,))
@@ -137,6 +138,19 @@ def test_all_that_is_in_the_record(case: Case) -> None:
     found["seconds"] = {kind: seconds > 0 for kind, seconds in found["seconds"].items()}
     files = sorted(path.name for path in case.folder.glob("*/*"))
     assert_approved("record", "\n".join([*told, *files, json.dumps(found, indent=1)]))
+
+
+WRONG = [None, {"other": 1.0}, {"towers": 1.0, "standing": 2.0}, {"towers": 1.0, "standing": "x"}]
+
+
+@pytest.mark.parametrize("score", WRONG)
+def test_an_outcome_that_cannot_be_is_a_failure(
+    case: Case, monkeypatch: pytest.MonkeyPatch, score: Any
+) -> None:
+    monkeypatch.setattr(LeaningTowers, "perform", lambda *_: score and Outcome(score))
+    record = run(case, TOWERS)
+    assert (record.status, record.metrics) == ("failed", {})
+    assert_approved_line("outcomes", f"{score}: {record.error}")
 
 
 @pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda t: t.name)
