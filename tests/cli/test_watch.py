@@ -118,13 +118,10 @@ def test_the_first_watch_notes_the_newest_and_the_next_begins_there(
 
 @pytest.mark.parametrize(
     ("words", "status", "ran"),
-    [
-        ("--since mujoco==3.2.7:minor", 1, ["3.2.7", "3.3.7", "4.0.0"]),
-        ("--since mujoco==3.2.7", 2, RELEASES[1:]),
-        ("mujoco --since mujoco==3.3.7 --reps 3 --scene a.xml --output out", 1, ["3.3.7", "4.0.0"]),
-        ("--since mujoco==4.0.0", 0, None),
-    ],
-)
+    [("--since mujoco==3.2.7:minor", 1, ["3.2.7", "3.3.7", "4.0.0"]),
+     ("--since mujoco==3.2.7", 2, RELEASES[1:]), ("--since mujoco==4.0.0", 0, None),
+     ("mujoco --since mujoco==3.3.7 --reps 3 --scene a.xml --output out", 1, ["3.3.7", "4.0.0"])],
+)  # fmt: skip
 def test_a_watch_may_begin_earlier(
     work: list[list[str]], capsys: pytest.CaptureFixture[str],
     words: str, status: int, ran: list[str] | None,
