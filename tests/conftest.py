@@ -129,12 +129,16 @@ SLOW = {
     "test_shrinks_to_the_smallest_amount",
     "test_the_file_has_what_the_command_finds",
     "test_the_shares_are_of_all_places_also_of_those_never_filled",
+    "test_whatever_is_in_it_nothing_else_is_raised",
     "test_without_a_change_one_row_in_twenty_has_one_at_most",
 }
 """They take more than a second of CPU time each, and no engine. The quick tier leaves them out."""
 
-ENGINE_FIXTURES = {"case", "machines", "pytester"}
+ENGINE_FIXTURES = {"case", "handle", "machines", "pytester"}
 """Of tests that run MuJoCo, pytest with simulators, or a cluster of them."""
+
+UNRUN = {"experiment", "handle", "job", "resumed", "scripted"}
+"""Files in which a `case` is for reading: who runs one has the mark there."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -152,6 +156,7 @@ def pytest_itemcollected(item: pytest.Item) -> None:
     """
     fixtures = set(getattr(item, "fixturenames", ()))
     rooms = set(item.path.relative_to(Path(__file__).parent).parts)
+    fixtures -= {"case"} if item.path.stem[5:] in UNRUN else set()
     if rooms & ENGINE_ROOMS or item.path.name == "test_browser.py" or fixtures & ENGINE_FIXTURES:
         item.add_marker("engine")
 

@@ -236,7 +236,7 @@ def _check_rows(name: str, value: Any, joints: int) -> None:
     except ValueError:  # rows of several lengths
         rows = np.array(None)
     _check(
-        rows.ndim == 2 and rows.dtype.kind in "fi" and len(rows) > 0 and rows.shape[1] == joints,
+        rows.ndim == 2 and rows.dtype.kind in "fi" and rows.shape[1] == joints,
         f"the {name} of a motion is no array of {joints} joints",
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -23,10 +24,11 @@ from pytest_simbench.cli.tune_told import (
     together,
     verdict_of,
 )
+from pytest_simbench.measure.intervals import Interval
 from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.simulator.profile_file import read_profile
 from pytest_simbench.tuning.search import front
-from tests.approval import assert_approved
+from tests.approval import assert_approved, assert_approved_line
 from tests.cli.command import said
 from tests.tuning.made_up import target, trials
 
@@ -66,19 +68,28 @@ def test_a_grip_that_creeps(
     assert "Is a directory" in capsys.readouterr().err
 
 
-def test_how_many_seeds_are_judged_and_on_which_it_was_chosen(tmp_path: Path) -> None:
+def test_how_many_seeds_are_judged_and_on_which_it_was_chosen(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """In a time, of looks of 1 s; a smaller step costs eight of them. A profile that began with
-    another file's was chosen on its seeds, too."""
+    another file's was chosen on its seeds, too; and it says when its commit is not all."""
     path = tmp_path / "first.toml"
     path.write_text('simulator = "mujoco"\n[chosen]\nseeds = [["stacking", 7, 9]]\n')
     for jobs, converged, seeds in ((1, False, 10), (2, False, 20), (2, True, 5)):
         of = replace(target(2, 40), converged=converged)
         looks, _ = trials(tmp_path / f"{jobs}{converged}", lambda s, k: 1.0, of, jobs)
-        looks.case = replace(looks.case, file=read_profile(path))
+        looks.case = replace(looks.case, file=read_profile(path), changes={"cone": "elliptic"})
         today = looks.today()
-        halves = _judge(looks, today, looks.choose("trial1", {}, [today]), 20.0)
+        found = looks.choose("trial1", {"timestep": 0.004}, [today])
+        halves = _judge(looks, today, found, 20.0)
         assert [len(one.records) for one in halves] == [seeds, seeds]
-    path.write_text(profile_of(Result(looks, [today], today, "", halves)))
+    assert _judge(looks, today, today, 20.0) == []
+    monkeypatch.chdir(tmp_path)
+    words = "init -q; git add first.toml; git -c user.name=x -c user.email=x commit -qm x"
+    subprocess.run(f"git {words}; echo >>first.toml", shell=True, check=True)
+    path.write_text(profile_of(Result(looks, [today, found], found, "why", halves)))
+    passing = r', "mujoco" = "[^"]*"|[0-9a-f]{12}(?=-dirty)|(?<== ")\d[^"]*(?=")'
+    assert_approved("tuned", re.sub(passing, "", path.read_text()))
     told = [Seen.seeds("stacking", 7, 9), Seen.seeds("falling", 300_001, 300_002)]
     assert [*read_profile(path).chosen_on] == told
 
@@ -91,15 +102,17 @@ def test_all_that_is_said_of_a_search(tmp_path: Path, capsys: pytest.CaptureFixt
     )  # fmt: skip
     today = looks.today()
     done, tell = [today], progress(looks)
-    for number, step in enumerate((0.003, 0.015, 0.001, 0.008), 1):
+    for number, step in enumerate((0.003, 0.015, 0.001, 0.008, *[0.0029] * 7), 1):
         one = looks.choose(f"trial{number}", {"timestep": step}, done)
         done.append(one)
         tell(one, front(done, looks))
     better = Result(looks, done, done[1], "it is cheaper", _judge(looks, today, done[1], 500.0))
     unknown = replace(better, halves=())
-    kept = replace(unknown, found=today)
+    kept, law = replace(unknown, found=today), replace(better)
+    half = replace(better.judgement, worse_by=None, cheaper=Interval(2.0, 1.5, 2.5, 60, "t"))
+    vars(law)["judgement"] = half
     lines = [capsys.readouterr().out, *together((better, unknown, kept))]
-    for of in (better, unknown, kept):
+    for of in (better, unknown, kept, law, replace(kept, done=[today])):
         lines += [*front_of(of), *verdict_of(of)]
     assert_approved("tune", "\n".join(lines))
 
@@ -168,36 +181,22 @@ def test_killed_and_gone_on_with(tmp_path: Path) -> None:
     assert converged[0]["settings"]["timestep"] == today["settings"]["timestep"] / 8
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("laws:x --sim mujoco", "no law or phenomenon is named 'x'"),
-        ("stacking", "name a simulator: --sim NAME"),
-        ("x.py::test_x --sim mujoco", "file or directory not found: x.py"),
-        ("stacking --sim mujoco --jobs 0", "whole number from 1 to 256, or auto"),
-        (
-            "stacking --sim mujoco --jobs 2 --cluster tcp://127.0.0.1:1",
-            "--cluster: leave out --jobs",
-        ),
-        ("stacking --sim mujoco,drake --settings condim", "none of 2 simulators could be tuned"),
-        ("tosses --sim mujoco", "simbench download cube_tosses"),
-        ("stacking --sim mujoko", "unknown simulator 'mujoko'; choose from"),
-        ("stacking --sim mujoco --settings condim", "no setting 'condim' to search"),
-        ("stacking --sim mujoco --budget 5", "give a time: 90s, 30min or 2h"),
-        ("stacking --sim mujoco --budget 0s", "give a time: 90s, 30min or 2h"),
-        ("stacking --sim mujoco --profile tuned,real", "give one profile"),
-        ("stacking --sim mujoco --profile no.toml", "cannot read the profile no.toml"),
-        ("stacking --sim mujoco --profile best", "no simulator has a settings profile"),
-    ],
-)
+WRONG = """laws:x --sim mujoco; stacking; x.py::test_x --sim mujoco; tosses --sim mujoco;
+stacking --sim mujoco --jobs 2 --cluster tcp://127.0.0.1:1;
+stacking --sim mujoco,drake --settings condim; stacking --sim mujoko;
+stacking --sim mujoco --settings condim; stacking --sim mujoco --budget 0s;
+stacking --sim mujoco --profile tuned,real; stacking --sim mujoco --profile no.toml;
+stacking --sim mujoco --profile best"""
+
+
+@pytest.mark.parametrize("words", re.split(r";\s", WRONG))
 def test_bad_input(
-    words: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SIMBENCH_DATA", str(tmp_path / "none"))
     status, _, told = said(capsys, "tune", *words.split())
     assert (status, told.count("\n")) == (2, 1)
-    assert message in told
+    assert_approved_line("tune_words", f"{words}: {told.strip()}".replace(f"{tmp_path}", "DIR"))
     assert not list(tmp_path.iterdir())

@@ -24,6 +24,7 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.scene import Pose, Scene, Sphere
 from pytest_simbench.tasks.base import cube
+from pytest_simbench.worker.wire import pack
 
 SCENE = Scene("s", (cube("a", Pose.at(0.0, 0.0, 2.0), (1.0,) * 4),))
 
@@ -130,20 +131,28 @@ def test_a_picture_that_cannot_be_drawn_ends_the_film_alone(case: Case) -> None:
     assert world.time == pytest.approx(0.31)
 
 
+def drawn(kind: str, *shape: int, seconds: float = 2.0) -> dict[str, Any]:
+    """What a worker sends of a picture."""
+    return {"time": 1, "seconds": seconds, "picture": pack(np.zeros(shape, kind))}
+
+
 @pytest.mark.parametrize(
-    "data",
-    [
-        None,
-        {},
-        {"time": 0.0, "seconds": 0.0, "picture": "x"},
-        {"time": 0.0, "seconds": 0.0, "picture": {"__array__": ["|u1", [2, 2], b"1234"]}},
-        {"time": 0.0, "seconds": 0.0, "picture": {"__array__": ["<f8", [1], b"12345678"]}},
-    ],
-)
-def test_what_is_no_picture_is_a_problem(data: Any) -> None:
-    frame = Frame.from_wire(data, SIZE)
-    assert frame.picture is None
-    assert frame.problem.startswith("the engine drew what is no picture of (48, 36): ")
+    ("data", "came"),
+    [(None, "None"), ("x" * 99, "'" + "x" * 79), ({"time": 1, "seconds": 2},) * 2,
+     (drawn("u1", 2, 2), "uint8 (2, 2)"), (drawn("f8", 36, 48, 3), "float64 (36, 48, 3)")],
+)  # fmt: skip
+def test_what_is_no_picture_is_a_problem(data: Any, came: object) -> None:
+    told = f"the engine drew what is no picture of (48, 36): {came}"
+    assert Frame.from_wire(data, SIZE) == Frame(0.0, None, told, 0.0)
+
+
+def test_a_picture_and_why_there_is_none() -> None:
+    for seconds, kept in ((2, 2.0), (-1, 0.0), (np.inf, 0.0)):
+        found = Frame.from_wire(drawn("u1", 36, 48, 3, seconds=seconds), SIZE)
+        assert found.picture is not None
+        assert replace(found, picture=None) == Frame(1.0, None, "", kept)
+    told = {"time": 1, "seconds": 2, "problem": "it is blind"}
+    assert Frame.from_wire(told, SIZE) == Frame(1.0, None, "it is blind", 0.0)
 
 
 LOW = SCENE.with_pose("a", Pose.at(0.0, 0.0, 0.2))

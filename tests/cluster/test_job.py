@@ -29,15 +29,16 @@ from tests.tiny import Falling
 
 def test_the_experiment_is_the_same_on_the_node(case: Case, tmp_path: Path) -> None:
     experiment = Experiment(replace(case, changes={"timestep": 0.001}), Falling(0.3))
-    there = Job.unpack(Job.of(experiment).pack().data or b"").experiment(tmp_path)
-    assert there.case.folder == tmp_path
+    job = Job.unpack(Job.of(experiment, "me").pack().data or b"")
+    there = job.experiment(tmp_path)
+    assert (job.client, there.case.folder) == ("me", tmp_path)
     assert replace(expected(there, 3), scene="") == replace(expected(experiment, 3), scene="")
 
 
 def of_node(experiment: Experiment, asked: str) -> str:
     """What a process elsewhere prints of the task that reached it."""
     code = (
-        "import sys; from pytest_simbench.cluster.job import Job\n"
+        "import sys; from pytest_simbench.cluster.job import Job; sys.modules['tests'] = None\n"
         f"task = Job.unpack(sys.stdin.buffer.read()).task\nprint({asked})"
     )
     packed, command = Job.of(experiment).pack().data, [sys.executable, "-P", "-c", code]
@@ -51,6 +52,7 @@ def test_a_task_of_the_tests_travels_as_code(case: Case) -> None:
     assert of_node(Experiment(case, Falling(0.25)), asked) == "Falling(duration=0.25) ['landed']"
 
 
+@pytest.mark.engine
 @pytest.mark.parametrize("name", ["still", "wrapped"])
 def test_so_does_the_policy_of_a_file(case: Case, tmp_path: Path, name: str) -> None:
     path = tmp_path / "mine.py"
@@ -80,7 +82,7 @@ def test_a_robot_travels_by_content(
     robot = find("xarm7")
     experiment = Experiment(replace(case, robot=robot), Stacking())
     data = Job.of(experiment).pack().data or b""
-    assert robot.urdf.encode() not in data
+    assert not any(path.encode() in data for path in (robot.urdf, robot.srdf))
     monkeypatch.setattr("pytest_simbench.description.robot_files.folder", lambda: tmp_path)
     there = Job.unpack(data).experiment(tmp_path)
     assert Path(there.robot.urdf).parent == tmp_path
@@ -147,6 +149,7 @@ def test_errors_come_back_as_what_they_are() -> None:
     assert isinstance(other, TaskFailed)
     assert not isinstance(other, WorkerError)
     assert str(other) == "ZeroDivisionError: division by zero\nTraceback ..."
+    assert str(error_from_wire(error_to_wire(ValueError("x")), where)) == "ValueError: x"
     assert error_from_wire(error_to_wire(None), where) is None
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -18,10 +19,12 @@ from hypothesis.errors import UnsatisfiedAssumption
 
 from pytest_simbench.cli.main import main
 from pytest_simbench.client.errors import WorkerExited
-from pytest_simbench.client.tape import Operation
+from pytest_simbench.client.tape import ARRAYS, Operation
+from pytest_simbench.experiment import example
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.example import (
     LARGEST,
+    Example,
     ExampleError,
     read_example,
     replay_command,
@@ -32,6 +35,7 @@ from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import Pose, Robot, Scene
 from pytest_simbench.tasks.base import cube
+from tests.approval import assert_approved_line
 from tests.hostile import assert_harmless_terminal
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
@@ -151,7 +155,8 @@ EVIL = "\x1b]0;owned\x07\x1b[2Jred\r\u202e"
 
 @pytest.fixture
 def path(case: Case) -> Path:
-    return write_example(case, "episode", SCENE, TAPE, {"mujoco": "3.0.0"})
+    path = write_example(case, "episode", SCENE, TAPE, {"mujoco": "3.0.0"})
+    return path.rename(case.folder / "episode.json")
 
 
 def changed(path: Path, *keys: Any, to: Any) -> Path:
@@ -164,6 +169,7 @@ def changed(path: Path, *keys: Any, to: Any) -> Path:
     return path
 
 
+@pytest.mark.engine
 def test_what_a_file_says_of_starting_is_not_looked_at(
     path: Path, case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -204,6 +210,29 @@ def test_what_a_file_says_of_starting_is_not_looked_at(
     assert not (tmp_path / "there").exists()
 
 
+def test_this_machine_says_how_it_is_run(
+    path: Path, case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own: dict[str, Any] = {"mode": "gui", "python": "p", "spec": "s"}
+    found = read_example(path, tmp_path / "logs", **own)
+    known = Case.of("mujoco", test=case.test, profile="tuned", folder=tmp_path / "logs", **own)
+    assert found == Example(known, SCENE, TAPE, {"mujoco": "3.0.0"})
+    monkeypatch.setattr(example, "missing", lambda info: f"no {info.name} here")
+    with pytest.raises(ExampleError, match="no mujoco here"):
+        read_example(path, tmp_path)
+
+
+def test_one_of_the_same_test_and_name_is_replaced(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, at, of in (("a", "t (setup)", "x"), ("a", "t (call)", "x"), ("b", "t (call)", "x"),
+                         ("a", "u (call)", "x"), ("a", "t (call)", "y")):  # fmt: skip
+        monkeypatch.setenv("PYTEST_CURRENT_TEST", at)
+        write_example(replace(case, test=of), name, SCENE, [])
+    assert len(list((case.folder / "examples").iterdir())) == 4
+
+
+@pytest.mark.engine
 def test_another_version_is_said(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["replay", str(path)]) == 0
     note, result, _ = capsys.readouterr().out.splitlines()
@@ -213,11 +242,15 @@ def test_another_version_is_said(path: Path, capsys: pytest.CaptureFixture[str])
 
 @pytest.mark.parametrize("robot", [panda(squeeze=10.0), find("ur5")], ids=lambda robot: robot.name)
 def test_a_built_in_robot_is_this_machine_s(case: Case, tmp_path: Path, robot: Robot) -> None:
-    path = write_example(case, "robot", replace(SCENE, robot=robot), TAPE)
+    rows = dict.fromkeys(ARRAYS, np.zeros((2, len(robot.joints))))
+    tape = [Operation("wait", {"duration": 86_400.0}), Operation("follow", {"tick": 600.0, **rows})]
+    path = write_example(case, "robot", replace(SCENE, robot=robot), tape)
     assert "/" not in json.dumps(json.loads(path.read_text())["scene"])  # no path of ours
     for key, value in (("urdf", "/etc/passwd"), ("packages", {"x": "/"}), ("srdf", "/dev/zero")):
         changed(path, "scene", "robot", key, to=value)
-    assert read_example(path, tmp_path).scene.robot == robot
+    found = read_example(path, tmp_path, python="p")
+    assert found.scene.robot == robot
+    assert [one.to_wire() for one in found.tape] == [one.to_wire() for one in tape]
 
 
 def test_a_robot_of_unknown_files_needs_a_word(
@@ -230,24 +263,24 @@ def test_a_robot_of_unknown_files_needs_a_word(
         "robot 'mine' is not known here (known: panda, so101, ur10, ur5, xarm7)"
         in capsys.readouterr().err
     )
-    assert read_example(path, tmp_path, trust_robot=True).scene == scene
+    assert read_example(path, tmp_path, python="p", trust_robot=True).scene == scene
     assert replay_command(path, case, scene).endswith(f"{path.name} --trust-robot")
-    assert main(["replay", str(path), "--trust-robot"]) == 0
+    assert main(["replay", str(path), "--trust-robot", "--python=/nowhere/python"]) == 1
 
 
 def test_the_line_says_how_it_was_started_here(case: Case, tmp_path: Path) -> None:
     path = tmp_path / "x y.json"
-    own = replace(case, python=sys.executable)
-    assert replay_command(path, own, SCENE).endswith(f"x y.json' --python={sys.executable}")
-    own = replace(case, spec="ssh=there//python=py")
-    assert replay_command(path, own, SCENE).endswith(" --spec=ssh=there//python=py")
+    own, begin = replace(case, python=sys.executable), f"simbench replay '{path}'"
+    assert replay_command(path, own, SCENE) == f"{begin} --python={sys.executable}"
+    own = replace(own, spec="ssh=there//python=py")
+    assert replay_command(path, own, SCENE) == f"{begin} --spec=ssh=there//python=py"
+    assert replay_command(path, case, SCENE) == begin
 
 
+@pytest.mark.engine
 def test_another_interpreter_is_the_user_s_to_name(
-    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = read_example(path, tmp_path, python="/usr/bin/python3").case
-    assert (found.python, found.spec) == ("/usr/bin/python3", None)
     assert main(["replay", str(path), f"--python={sys.executable}"]) == 0
     assert main(["replay", str(path), "--python=/nowhere/python"]) == 1
     assert "/nowhere/python" in capsys.readouterr().err
@@ -257,72 +290,52 @@ FOLLOW = {"tick": 0.1, "position": [[0.0]], "velocity": [[0.0]], "effort": [[0.0
 BOX = cube("a", Pose.at(0.0, 0.0, 0.2), WHITE).to_wire()
 
 # Scenes and settings that are none: tests/scene/test_checks.py, tests/simulator/test_settings.py.
-BROKEN: list[tuple[tuple[Any, ...], Any, str]] = [
-    (("schema",), 3, "schema 3, this reads up to 2"),
-    (("schema",), "1", "schema '1'"),
-    (("case",), [1], "its 'case' is no dict"),
-    (("case", "simulator"), "nowhere", "unknown simulator 'nowhere'; choose from "),
-    (("case", "simulator"), 3, "its 'simulator' is no str"),
-    (("case", "simulator"), EVIL, r"unknown simulator '\x1b]0;owned"),
-    (("case", "mode"), "magic", "mujoco has no mode 'magic': headless, gui"),
-    (("case", "profile"), "best", "has no settings profile 'best'; choose from default, tuned"),
-    (("case", "changes"), {"timestep": "x"}, "give a finite number"),
-    (("case", "versions"), [1], "holds no episode"),
-    (("scene",), None, "its 'scene' is no dict"),
-    (("scene", "bodies"), [BOX] * 301, "more than 300 bodies"),
-    (("scene", "bodies"), [BOX, BOX], "2 bodies are named 'a'"),
-    (("scene", "bodies"), [3], "holds no episode"),
-    (("scene", "gravity"), [0, 0], "the gravity [m/s^2] of scene 's' is (0, 0)"),
-    (("scene", "robot"), 3, "holds no episode"),
-    (("scene", "robot"), {"name": "panda"}, "holds no episode"),
-    (("scene", "bodies", 0, "mass"), -1, "the mass [kg] of 'a' is -1"),
-    (("scene", "bodies", 0, "name"), EVIL, r"a body has the name '\x1b]0;owned"),
-    (("scene", "bodies", 0, "pose", "quaternion"), [0, 0, 0, 0], "has the length 0; it must be 1"),
-    (("tape",), {}, "its 'tape' is no list"),
-    (("tape",), [3], "an operation is no object"),
-    (("tape", 0, "kind"), "exec", "an operation is 'exec', neither 'follow' nor 'wait'"),
-    (("tape", 0, "phase"), None, "its 'phase' is no str"),
-    (("tape", 0, "arguments"), {"duration": -1}, "has the duration -1"),
-    (("tape", 0, "arguments"), {"duration": 1e9}, "it takes up to 86400 s"),
-    (("tape", 0, "arguments"), {"duration": True}, "has the duration True"),
-    (("tape", 0, "arguments"), {"duration": 1, "op": "close"}, "an operation 'wait' has ["),
-    (("tape", 0, "arguments"), {"duration": 1, "striking": 1}, "an operation 'wait' has ["),
-    (("tape", 0), {"kind": "follow", "arguments": FOLLOW, "phase": ""}, "is no array of 0 joints"),
+BROKEN: list[tuple[tuple[Any, ...], Any]] = [
+    (("schema",), 3), (("schema",), "1"), (("case",), [1]), (("case", "simulator"), "nowhere"),
+    (("case", "simulator"), 3), (("case", "simulator"), EVIL), (("case", "mode"), "magic"),
+    (("case", "profile"), "best"), (("case", "changes"), {"timestep": "x"}),
+    (("case", "versions"), [1]), (("scene",), None), (("scene", "bodies"), [BOX] * 301),
+    (("scene", "bodies"), [BOX, BOX]), (("scene", "bodies"), [3]), (("scene", "gravity"), [0, 0]),
+    (("scene", "robot"), 3), (("scene", "robot"), {"name": "panda"}),
+    (("scene", "bodies", 0, "mass"), -1), (("scene", "bodies", 0, "name"), EVIL),
+    (("scene", "bodies", 0, "pose", "quaternion"), [0, 0, 0, 0]), (("tape",), {}), (("tape",), [3]),
+    (("tape", 0, "kind"), "exec"), (("tape", 0, "phase"), None),
+    (("tape", 0, "arguments"), {"duration": -1}), (("tape", 0, "arguments"), {"duration": 1e9}),
+    (("tape", 0, "arguments"), {"duration": True}),
+    (("tape", 0, "arguments"), {"duration": 1, "op": "close"}),
+    (("tape", 0, "arguments"), {"duration": 1, "striking": 1}),
+    (("tape", 0), {"kind": "follow", "arguments": FOLLOW, "phase": ""}),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("keys", "value", "said"), BROKEN, ids=lambda value: ascii(value)[:30])
+@pytest.mark.parametrize(("keys", "value"), BROKEN, ids=lambda value: ascii(value)[:30])
 def test_something_else_in_it_is_a_sentence(
-    path: Path, keys: tuple[Any, ...], value: Any, said: str, capsys: pytest.CaptureFixture[str]
+    path: Path, keys: tuple[Any, ...], value: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["replay", str(changed(path, *keys, to=value))]) == 2
+    assert main(["replay", str(changed(path, *keys, to=value)), "--python=p"]) == 2
     told = capsys.readouterr().err
-    assert said in told
     assert told.startswith(f"simbench replay: {path}")
     assert told.count("\n") == 1
+    place = f"{'.'.join(map(str, keys))} = {value!a:.40}"
+    assert_approved_line("episodes", f"{place} | {told.partition(f'{path}')[2].strip()}")
     assert_harmless_terminal(told)
 
 
-@pytest.mark.parametrize(
-    ("rows", "said"),
-    [
-        ([[0.0] * 8], "is no array of 9 joints"),
-        ([[0.0] * 9, [0.0]], "is no array of 9 joints"),
-        ([["x"] * 9], "is no array of 9 joints"),
-        ([[None] * 9], "is no array of 9 joints"),
-        ([], "is no array of 9 joints"),
-        ([[0.0] * 9] * 2, "have several lengths"),
-        ([[0.0] * 9] * 10_000, "a motion lasts longer than 600 s"),
-    ],
-    ids=["joints", "ragged", "texts", "none", "empty", "lengths", "long"],
-)
-def test_a_motion_that_is_none(case: Case, tmp_path: Path, rows: Any, said: str) -> None:
-    motion = dict.fromkeys(("position", "velocity", "effort"), rows)
-    if said.endswith("lengths"):
-        motion["effort"] = rows[:1]
+MOTIONS = {
+    "joints": [[0.0] * 8], "ragged": [[0.0] * 9, [0.0]], "texts": [["x"] * 9], "none": [[None] * 9],
+    "empty": [], "lengths": [[0.0] * 9] * 2, "long": [[0.0] * 9] * 10_000,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", MOTIONS)
+def test_a_motion_that_is_none(case: Case, tmp_path: Path, what: str) -> None:
+    motion: dict[str, Any] = dict.fromkeys(ARRAYS, MOTIONS[what])
+    if what == "lengths":
+        motion["effort"] = motion["effort"][:1]
     wrong = [Operation("follow", {"tick": 0.1, **motion})]
     path = write_example(case, "motion", replace(SCENE, robot=panda()), wrong)
-    with pytest.raises(ExampleError, match=said):
+    path = path.rename(tmp_path / f"{what}.json")
+    with pytest.raises(ExampleError, match="motion"):
         read_example(path, tmp_path)
 
 
@@ -354,7 +367,7 @@ JSON = st.recursive(
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
 @given(
-    where=st.sampled_from([keys for keys, _, _ in BROKEN] + [("case", "test")]),
+    where=st.sampled_from([keys for keys, _ in BROKEN] + [("case", "test")]),
     value=JSON,
 )
 def test_whatever_is_in_it_nothing_else_is_raised(
@@ -391,7 +404,7 @@ def test_a_worker_that_fails_is_a_sentence(
         raise EngineFailed(f"no {EVIL}", Where("mujoco", "headless"))
 
     monkeypatch.setattr("pytest_simbench.repeatability.example._replay", fails)
-    assert main(["replay", str(path)]) == 1
+    assert main(["replay", str(path), "--python=p"]) == 1
     told = capsys.readouterr().err
     assert told.startswith(r"no \x1b]0;owned")
     assert_harmless_terminal(told)

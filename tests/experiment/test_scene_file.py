@@ -29,17 +29,9 @@ def test_a_file_is_read_once_until_it_changes(
     assert read_scene_file(path).scene.body("block")
 
 
-@pytest.mark.parametrize(
-    ("name", "why"),
-    [
-        ("a.usd", "usd files are not read yet; .* by usd2mjcf"),
-        ("a.sdf", "sdf files are not read yet; .* by sdformat-mjcf"),
-        ("a.txt", "no engine here reads .txt files; give .*xml"),
-        ("a.xml", "No such file"),
-    ],
-)
-def test_files_that_nobody_reads_are_told(tmp_path: Path, name: str, why: str) -> None:
-    with pytest.raises(DescriptionError, match=why):
+@pytest.mark.parametrize("name", ["a.usd", "a.sdf", "a.txt", "a.urdf"])
+def test_files_that_nobody_reads_are_told(tmp_path: Path, name: str) -> None:
+    with pytest.raises(DescriptionError, match=name):
         read_scene_file(tmp_path / name)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from dataclasses import replace
 from typing import Any
@@ -12,10 +13,12 @@ import pytest
 from pytest_simbench.client.errors import RepetitionTimeout
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.experiment.repetition import Hooks, Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.scene import Pose
 from pytest_simbench.tasks import Jitter, LeaningTowers, Stacking, Task, Throwing
+from pytest_simbench.tasks.base import Outcome
+from tests.approval import assert_approved, assert_approved_line
 from tests.tasks.scripted import Effect, Mishap, ScriptedProcess, fail, move, put, stacked
 
 TOWERS = LeaningTowers(margins=(0.01,))
@@ -114,14 +117,40 @@ def test_a_repetition_has_the_studys_time_out_or_the_users(
     assert record.limits["timeout"] == seconds
 
 
-def test_the_scores_and_details_are_in_the_record(case: Case) -> None:
-    record = run(
-        case, replace(TOWERS, margins=(0.01, 0.01)), Mishap("settle", 2.0, move("cube_08", x=0.1))
-    )
-    assert record.status == "ok"
-    assert record.metrics == {"standing": 7 / 8, "towers": 1 / 2}
-    assert record.details["fallen"] == ["cube_08"]
-    assert record.stepping["simulated"] == 3.0
+def test_all_that_is_in_the_record(case: Case) -> None:
+    """Whatever the case says of it, scores, details, and what a task tells meanwhile."""
+    case = replace(
+        case, function="test_x", variant="mine", seed=7, jitter=0.5, memory_limit=900.0, attempt=2,
+        contended=True, own_timestep=0.002, needs=("--policies=x.py",), trace="on",
+    )  # fmt: skip
+    task, told = replace(TOWERS, margins=(0.01, 0.01)), list[str]()
+    fallen = Mishap("settle", 2.0, move("cube_08", x=0.1))
+    repetition = ScriptedRepetition(Experiment(case, task), 3, fallen)
+    repetition.hooks = Hooks(
+        begin=lambda node: told.append("begins"), phase=told.append,
+        count=lambda *counts: told.append(f"{counts}"),
+    )  # fmt: skip
+    record, error = repetition.run()
+    assert error is None
+    found = record.to_dict()
+    for passing in ("host", "versions", "timeline"):
+        assert found.pop(passing)
+    found["seconds"] = {kind: seconds > 0 for kind, seconds in found["seconds"].items()}
+    files = sorted(path.name for path in case.folder.glob("*/*"))
+    assert_approved("record", "\n".join([*told, *files, json.dumps(found, indent=1)]))
+
+
+WRONG = [None, {"other": 1.0}, {"towers": 1.0, "standing": 2.0}, {"towers": 1.0, "standing": "x"}]
+
+
+@pytest.mark.parametrize("score", WRONG)
+def test_an_outcome_that_cannot_be_is_a_failure(
+    case: Case, monkeypatch: pytest.MonkeyPatch, score: Any
+) -> None:
+    monkeypatch.setattr(LeaningTowers, "perform", lambda *_: score and Outcome(score))
+    record = run(case, TOWERS)
+    assert (record.status, record.metrics) == ("failed", {})
+    assert_approved_line("outcomes", f"{score}: {record.error}")
 
 
 @pytest.mark.parametrize("task", [Stacking(), Throwing()], ids=lambda t: t.name)
