@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from pytest_simbench.measure.change_points import PERMUTATIONS, _chance, change_points
+from pytest_simbench.measure.change_points import PERMUTATIONS, _chance, _shifts, change_points
 
 Row = list[dict[int, float]]
 
@@ -39,6 +39,14 @@ def test_the_levels_are_those_between_the_changes() -> None:
     (found,) = change_points(values)
     assert (found.place, found.before, found.after) == (3, pytest.approx(2.1), pytest.approx(6.1))
     assert found.p_value < 0.01
+
+
+def test_a_split_counts_by_the_difference_of_its_means_and_by_how_many_values_tell_it() -> None:
+    table = np.array([[[0.0, 2.0], [0.0, 2.0], [3.0, 5.0], [3.0, np.nan]]])
+    means = (13 / 5 - 1, 11 / 3 - 1, 3 - 12 / 6)
+    sizes = (2 * 5 / 7, 4 * 3 / 7, 6 * 1 / 7)
+    told = [gap * size**0.5 for gap, size in zip(means, sizes, strict=True)]
+    assert _shifts(table)[0] == pytest.approx(told)
 
 
 def test_without_a_change_one_row_in_twenty_has_one_at_most() -> None:

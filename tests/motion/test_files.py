@@ -263,9 +263,9 @@ IN_TOML = {
         swap('"grip"', '"upper"'),
         r"the tool frame 'upper' hangs on 'lift', not on 'bend', the last joint of the arm",
     ),
-    "a hand that opens inwards": (
-        swap("closed = 0.0", "closed = 0.05"),
-        r"opened: it must be above closed, which is 0\.05",
+    "a hand that does not open": (
+        swap("closed = 0.0", "closed = 0.04"),
+        r"opened: it must be above closed, which is 0\.04",
     ),
     "a hand without a finger of its own": (
         swap('["left_finger", "right_finger"]', '["left_finger"]'),

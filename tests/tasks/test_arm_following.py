@@ -54,7 +54,9 @@ def test_an_arm_that_does_as_told_is_off_by_what_the_real_one_is(
     run = ArmRun(f"{PUSH}0001", time, hand, cube)
     assert started(run, robot) == pytest.approx(1.3, abs=0.02)
     monkeypatch.setattr(ArmFollowing, "chosen", (run,))
-    lying = task.scene(3, Jitter()).body(CUBE).pose.as_array()
+    scene = task.scene(3, Jitter())
+    assert scene.name == "arm following"
+    lying = scene.body(CUBE).pose.as_array()
     assert lying == pytest.approx([0.5, 0.1, CUBE_SIZE / 2, *cube[0, 3:]])
     outcome, process = perform(task, Mishap("follow", 5.0, move(CUBE, x=0.05)))
     assert outcome.metrics["hand_error"] == pytest.approx(0.01, abs=2e-3)
