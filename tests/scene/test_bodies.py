@@ -30,6 +30,7 @@ from pytest_simbench.scene import (
     penetration,
     principal,
 )
+from pytest_simbench.scene.body import Solid
 from pytest_simbench.scene.friction import RULES
 from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.testing import scenes
@@ -375,3 +376,10 @@ def test_links_that_collide_keep_their_own_friction_or_that_they_do_not_is_told(
 def test_an_unknown_rule_is_refused_with_those_there_are() -> None:
     with pytest.raises(SceneError, match=r"'loudest'.*maximum, minimum, mean"):
         Scene("s", friction_rule="loudest")
+
+
+def test_what_is_drawn_of_a_can_and_of_a_pill() -> None:
+    pose = Pose.at(1.0, 0.0, 0.5)
+    assert Cylinder("can", 0.1, 0.3, pose, 1.0).solids() == [Solid("tube", (0.2, 0.2, 0.3))]
+    drawn = [(solid.kind, solid.extents) for solid in Capsule("pill", 0.1, 0.3, pose, 1.0).solids()]
+    assert drawn == [("tube", (0.2, 0.2, 0.3)), *[("ball", (0.2, 0.2, 0.2))] * 2]
