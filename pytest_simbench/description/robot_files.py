@@ -15,12 +15,13 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from copy import deepcopy
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 from pytest_simbench.description.mesh_check import LARGEST_MESH
 from pytest_simbench.description.urdf_check import LARGEST_FILE, Description
+from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.ground.files import FileError, read_file
 from pytest_simbench.scene import Robot
 
@@ -30,11 +31,24 @@ CONTENT = "content"
 
 def last_change(robot: Robot) -> tuple[int, ...]:
     """When the files were written that describe a robot [ns]: what was read before may be stale."""
+    found = _written(robot.urdf, robot.srdf)
+    with suppress(DescriptionError):  # whoever reads it tells
+        found += _written(*_meshes(robot, found))
+    return found
+
+
+def _written(*paths: str) -> tuple[int, ...]:
     found = []
-    for path in filter(None, (robot.urdf, robot.srdf)):
+    for path in filter(None, paths):
         with suppress(OSError):  # whoever reads it tells
             found.append(os.stat(path).st_mtime_ns)
     return tuple(found)
+
+
+@lru_cache(maxsize=64)
+def _meshes(robot: Robot, changed: tuple[int, ...]) -> tuple[str, ...]:
+    """Paths of the meshes that its URDF names."""
+    return tuple(Description(robot.urdf, robot.packages).meshes.values())
 
 
 def description_xml(robot: Robot) -> ET.Element:
@@ -55,7 +69,7 @@ def _collision_xml(checked: Description, name: str, name_of: Callable[[Path], st
         for visual in element.findall("visual"):
             element.remove(visual)
         for mesh in element.iterfind("collision/geometry/mesh"):
-            mesh.set("filename", name_of(Path(checked.mesh(mesh.get("filename", "")))))
+            mesh.set("filename", name_of(Path(checked.meshes[mesh.get("filename", "")])))
         root.append(element)
     return root
 
@@ -66,6 +80,12 @@ def content_of(robot: Robot) -> dict[str, Any]:
     Raises:
         DescriptionError: a file is missing or wrong; says which.
     """
+    return dict(_content_of(robot, last_change(robot)))
+
+
+@lru_cache(maxsize=16)
+def _content_of(robot: Robot, changed: tuple[int, ...]) -> dict[str, Any]:
+    """The same, read once: each repetition asks for it."""
     return content(Description(robot.urdf, robot.packages), robot.name)
 
 

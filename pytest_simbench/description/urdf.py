@@ -184,7 +184,7 @@ class PreparedRobot:
             if box is not None:
                 link.shapes.append(Shape(origin_of(collision), size=numbers(box.attrib["size"])))
             elif mesh is not None:
-                path = self._description.mesh(mesh.attrib["filename"])
+                path = self._description.meshes[mesh.attrib["filename"]]
                 link.shapes.append(Shape(origin_of(collision), mesh=path))
         return link
 

@@ -45,6 +45,7 @@ class Description:
     Attributes:
         joints: elements, in the order of the file.
         root: name of the link on which all others hang.
+        meshes: absolute path of each mesh, by the name that the file gives it.
 
     Raises:
         DescriptionError: the file is not there, or something in it cannot be; says what.
@@ -59,7 +60,7 @@ class Description:
         self.path = path
         self.packages = packages
         self._lines: dict[ET.Element, int] = {}
-        self._meshes: dict[str, str] = {}
+        self.meshes: dict[str, str] = {}
         self.xml = xml = read_xml(path, "the robot description", self._lines)
         if change is not None:
             change(xml)
@@ -84,10 +85,6 @@ class Description:
             self._check_joint(joint)
         self.root = self._check_tree()
         self._check_mimics()
-
-    def mesh(self, filename: str) -> str:
-        """Absolute path of a mesh that the file names."""
-        return self._meshes[filename]
 
     def refuse(self, element: ET.Element, why: str, inside: ET.Element | None = None) -> NoReturn:
         """Raise the error about an element, with its line."""
@@ -208,14 +205,14 @@ class Description:
                 shape,
             )
         name = shape.get("filename", "")
-        if name in self._meshes:
+        if name in self.meshes:
             return
         try:
             path = mesh_path(name, self.path, self.packages)
             check_mesh(path)
         except FileError as error:
             self.refuse(link, f"has a mesh that cannot be used: {error}", shape)
-        self._meshes[name] = str(path)
+        self.meshes[name] = str(path)
 
     # Joints
 

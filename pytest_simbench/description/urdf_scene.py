@@ -77,7 +77,7 @@ class _World(Description):
             kept, gap = _round(radius, length / 2 if long else 0.0)
             geometry.remove(shape)
             ET.SubElement(geometry, "mesh", filename=kept)
-            self._meshes[kept] = kept
+            self.meshes[kept] = kept
             name = link.attrib["name"]
             self._round[name] = max(gap, self._round.get(name, 0.0))
             return
