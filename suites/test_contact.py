@@ -48,8 +48,9 @@ def test_slips(repeat, threshold):
 
 def judged(result):
     """Skip with the reason where an engine's shapes leave too little of the clearance."""
-    if not result.values("inserted"):
-        pytest.skip(result.records[0].reasons[0])
+    finished = [record for record in result.records if record.ok]
+    if finished and all(record.metrics.get("inserted") is None for record in finished):
+        pytest.skip(finished[0].reasons[0])
     return result
 
 

@@ -39,7 +39,7 @@ from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.simulator.registry import adapter, known
 from pytest_simbench.tasks.base import Task
 
-REFUSED = (SimulatorError, RecordError, DisplayError, NotResumed, ExecutorError, LoopError)
+REFUSED = (SimulatorError, RecordError, DisplayError, NotResumed, ExecutorError)
 """What becomes bad input, in its own words."""
 
 
@@ -115,8 +115,9 @@ def run(
             repeater = Repeater(experiment, executor, printed(quiet), place.append, resumed=resumed)
             try:
                 repeater.up_to(experiment.repetitions(wanted), found)
-            except (Unavailable, WorldParityError) as error:
-                problems.append(f"{experiment.case.simulator}: {error.what}")
+            except (Unavailable, WorldParityError, LoopError) as error:
+                what = error if isinstance(error, LoopError) else error.what
+                problems.append(f"{experiment.case.simulator}: {what}")
             except (KeyboardInterrupt, Exception) as error:  # Ctrl-C, or a fault of the task
                 error.add_note(f"records are kept: folder={str(place.path)!r}, resume=True goes on")
                 raise

@@ -11,6 +11,10 @@ from pytest_simbench.worker.wire import LONGEST, readable, told
 
 __tracebackhide__ = True  # a mistake in a task is told at its own line
 
+ROUNDING = 1e-9
+"""A value below the least that there can be by no more than this is the least. A share beyond 1 is
+a mistake."""
+
 
 def status(error: BaseException | None) -> Status:
     """`interrupted` is what somebody ended from outside, and only that: it may be run again."""
@@ -29,24 +33,28 @@ def failure(error: BaseException, where: Where) -> Failure:
 
 
 def checked(record: Record, task: Task) -> Record:
-    """The record as a reader of its line has it, where a number that is none is None.
+    """The record as a reader of its line has it.
 
     Raises:
-        RecordError: no reader takes it, a proportion is not in 0..1, or a value has a name that
-            none of the task's metrics has, while one of these has no value.
+        RecordError: no reader takes it; a value is not finite, or one that its metric cannot have;
+            or it has a name that none of the task's metrics has, while one of these has no value.
     """
     names = {metric.name for metric in task.metrics}
     if names - record.metrics.keys() and (others := record.metrics.keys() - names):
         unknown = UnknownMetric(min(others), names, f" in the outcome of {task.name}")
         raise RecordError(str(unknown))
     data = record.to_dict()
-    for name, value in data["metrics"].items():
-        if not isinstance(value, float | int | None):
-            raise RecordError(f"{name} of {task.name} must be a number or None, not {short(value)}")
-    found = Record.from_dict(data, f"the outcome of {task.name}")
+    values = data["metrics"]
+    for name, value in values.items():
+        given = record.metrics[name]
+        if not isinstance(value, float | int | None) or (value is None and given is not None):
+            raise RecordError(
+                f"{name} of {task.name} must be a finite number or None, not {short(given)}"
+            )
     for metric in task.metrics:
-        value = found.metrics.get(metric.name)
-        # A distance below 0 may be rounding; a share beyond 1 is a mistake.
-        if value is not None and metric.bounded and not metric.holds(value):
-            raise RecordError(f"{metric.name} of {task.name} cannot be {value:g}")
-    return found
+        value = values.get(metric.name)
+        if value is not None and not metric.holds(value):
+            if metric.least is None or value < metric.least - ROUNDING:
+                raise RecordError(f"{metric.name} of {task.name} cannot be {value:g}")
+            values[metric.name] = metric.least
+    return Record.from_dict(data, f"the outcome of {task.name}")

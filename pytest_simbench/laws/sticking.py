@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -55,12 +56,14 @@ BETWEEN = 0.02
 
 def fan(critical: float, moved: Sequence[bool]) -> Reading:
     """The value at which a fan of cases, in the order of `SHARES`, changes from what stays to what
-    moves: in the middle between the two neighbours, at an end where all stay or all move."""
+    moves: in the middle between the two neighbours, at an end where all stay or all move. Where one
+    moves before another that stays, that below the first or above the last, whichever is farther
+    off."""
     values = [share * critical for share in SHARES]
-    stay = len(values) - sum(moved)
-    found = values[0] if stay == 0 else values[-1]
-    if 0 < stay < len(values):
-        found = (values[stay - 1] + values[stay]) / 2
+    middles = [values[0], *((a + b) / 2 for a, b in pairwise(values)), values[-1]]
+    first = [*moved, True].index(True)
+    last = len(values) - [*reversed(moved), False].index(False)
+    found = max(middles[first], middles[last], key=lambda value: abs(value - critical))
     return Reading(found, critical, BETWEEN * critical)
 
 

@@ -116,7 +116,7 @@ def check_threshold(metric: Metric, value: float) -> None:
         LimitError: it is no finite number, or lies outside what the metric can be.
     """
     __tracebackhide__ = True
-    if not isinstance(value, Real) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise LimitError(f"a threshold of {metric.name} is a finite number, not {value!r:.80}")
     if metric.bounded and not 0 <= value <= 1:
         hint = f"; did you mean {significant(value / 100)}?" if 1 < value <= 100 else ""

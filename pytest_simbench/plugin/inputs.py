@@ -89,7 +89,7 @@ class SceneFiles:
         """The log of a file that drives of a scene follow, see `recordings.logs`."""
         from pytest_simbench.recordings.logs import read_log
 
-        with _ending():
+        with _ending(self.request.config):
             return read_log(self.request.path.parent / path, scene)
 
     def __call__(self, path: str | Path | None = None, starts: str | Path | None = None) -> Scene:
@@ -111,7 +111,7 @@ class SceneFiles:
         if path is None and not given:
             pytest.skip("this test takes the scene of --sim-scene FILE, and none was named")
         at = Path(given) if path is None else self.request.path.parent / path
-        with _ending():
+        with _ending(self.request.config):
             found = read_scene_file(at)
             scene = found.scene
             rows: tuple[Start, ...] = ()
@@ -137,10 +137,14 @@ class SceneFiles:
         return scene
 
 
-def _ending() -> AbstractContextManager[None]:
-    """A file that cannot be used ends the run with one sentence."""
+def _ending(config: pytest.Config) -> AbstractContextManager[None]:
+    """A file that cannot be used ends the run with one sentence; in an xdist worker, whose end
+    would be an internal error, it fails the test."""
     from pytest_simbench.scene import SceneError
     from pytest_simbench.simulator import SimulatorError
 
+    ends: Callable[[str], BaseException]
     ends = partial(pytest.exit.Exception, returncode=pytest.ExitCode.USAGE_ERROR)
+    if hasattr(config, "workerinput"):
+        ends = partial(pytest.fail.Exception, pytrace=False)
     return refusing((SimulatorError, SceneError), kind=ends)

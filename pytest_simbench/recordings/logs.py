@@ -187,6 +187,7 @@ def _recorded(path: Path, scene: Scene) -> Columns:
 
     store, frames = Messages().store, {frame_of(body): body for body in scene.free_bodies}
     found: dict[str, list[Any]] = {"time": []}
+    stamps: dict[int, None] = {}  # of what moves a body: a scene without joints tells no other
     with Reader(path) as reader:
         if reader.message_count > MOST:
             raise ValueError(f"it holds more than {MOST} messages")
@@ -201,10 +202,12 @@ def _recorded(path: Path, scene: Scene) -> Columns:
                 continue
             for told in message.transforms:
                 if body := frames.get(told.child_frame_id):
+                    stamps[stamp] = None
                     t, q = told.transform.translation, told.transform.rotation
                     pose = Pose.from_array([t.x, t.y, t.z, q.w, q.x, q.y, q.z])
                     row = place(body.moved_to(pose)).as_array()
                     found.setdefault(f"{body.name}/pose", []).append(row)
+    found["time"] = found["time"] or [stamp / NANOSECONDS for stamp in stamps]
     return {name: np.array(rows) for name, rows in found.items()}
 
 

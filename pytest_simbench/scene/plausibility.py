@@ -76,7 +76,7 @@ def _too_deep(scene: Scene, bodies: FloatArray) -> str | None:
     position, turn = states[:, :3], rotations(states[:, 3:])
     down = np.einsum("ni,ni->n", np.abs(turn[:, 2]), half)
     for k in np.flatnonzero(~boxes):
-        down[k] = everything[k].reach(turn[k, 2][None])[0]
+        down[k] = everything[k].reach(-turn[k, 2][None])[0]
     depth = down - position[:, 2]
     for k in np.flatnonzero(depth[: len(bodies)] > limit[: len(bodies)]):
         if scene.kept_apart("ground", f"body/{names[k]}"):

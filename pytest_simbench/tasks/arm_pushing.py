@@ -17,6 +17,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.signal import savgol_filter
+from scipy.spatial.transform import Rotation, Slerp
 
 from pytest_simbench.client.world import World
 from pytest_simbench.data import pushes
@@ -161,7 +162,8 @@ class ArmPushing(MicoTask):
             motion = world.follow(trajectory, log_period=TICK)
         world.mark("end")
         states = np.vstack([course.start.as_array(), motion.bodies[:, 0, :7]])
-        metrics, details = compared(states, course.real)
+        moved = each_tick(np.append(0.0, motion.time), states)
+        metrics, details = compared(moved, course.real)
         off = float(np.abs(motion.joints[-1, 0] - course.path[-1]).max())
         return Outcome(metrics, {"run": self.real(seed).name, **details, "hand_error": off})
 
@@ -175,6 +177,19 @@ class ArmPushing(MicoTask):
         model = RobotModel(self.arm(path[0]))
         effort = model.inverse_dynamics(gravity, path, velocity, acceleration)
         return Trajectory(TICK, path, velocity, effort)
+
+
+def each_tick(time: FloatArray, states: FloatArray) -> FloatArray:
+    """A body's motion at the times of the recording: a step may not divide these.
+
+    Args:
+        time: of the samples [s], (n,), from 0.
+        states: rows of `Pose.as_array`, (n, 7).
+    """
+    at = np.minimum(TICK * np.arange(round(time[-1] / TICK) + 1), time[-1])
+    position = [np.interp(at, time, column) for column in states[:, :3].T]
+    turns = Slerp(time, Rotation.from_quat(states[:, 3:], scalar_first=True))(at)
+    return np.column_stack([*position, turns.as_quat(scalar_first=True)])
 
 
 def compared(moved: FloatArray, real: FloatArray) -> tuple[dict[str, float | None], dict[str, Any]]:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
-from pytest_simbench.scene.policy import Policy
+from pytest_simbench.scene.policy import Function, Policy
 from pytest_simbench.scene.set_points import SetPoints, Sight, written
 from pytest_simbench.simulator import PolicyError
 from pytest_simbench.worker.wire import named
@@ -143,6 +143,8 @@ def inside(scene: Scene, told: Row, period: float, policy: Mapping[str, Any]) ->
 def raised(error: BaseException) -> str:
     """What a policy raised that was asked where `error` was caught, and in which line."""
     line = error.__traceback__ and error.__traceback__.tb_next
+    if line is not None and line.tb_frame.f_code is Function.act.__code__:
+        line = line.tb_next
     at = f" ({Path(line.tb_frame.f_code.co_filename).name}:{line.tb_lineno})" if line else ""
     return f"raised {named(error)}{at}"
 

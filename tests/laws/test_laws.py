@@ -15,6 +15,7 @@ from pytest_simbench.laws import LAWS, Law, Reading
 from pytest_simbench.laws.base import Watched
 from pytest_simbench.laws.hands import PushTurns
 from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
+from pytest_simbench.laws.sticking import fan
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
 from pytest_simbench.records.phenomena import PHENOMENA, PHENOMENON
 from pytest_simbench.scene import Scene
@@ -149,3 +150,13 @@ def test_a_pushed_prism_turns_as_its_acceleration_says() -> None:
 def test_a_short_run_of_a_long_pendulum_has_four_periods() -> None:
     law = BY_NAME["pendulum_energy_drift"]
     assert law.smoke().seconds == pytest.approx(law.seconds / 25)
+
+
+@pytest.mark.parametrize(
+    ("moved", "found"),
+    [("000111", 1.0), ("000000", 1.08), ("111111", 0.92), ("011111", 0.94),
+     ("001011", 0.97), ("011011", 0.94), ("000101", 1.06), ("101111", 0.92)],
+)  # fmt: skip
+def test_a_fan_whose_cases_contradict_each_other_is_off(moved: str, found: float) -> None:
+    reading = fan(2.0, [case == "1" for case in moved])
+    assert reading.value == pytest.approx(2 * found)

@@ -129,6 +129,7 @@ def test_a_limit_that_something_can_exceed_is_taken(text: str) -> None:
         (PLACED, 900.0, "not at 900$"),
         (PLACED, -1.0, "not at -1$"),
         (PLACED, math.nan, "a threshold of placed is a finite number, not nan"),
+        (ERROR, True, "a threshold of landing_error is a finite number, not True"),
         (PLACED, "x", "a threshold of placed is a finite number, not 'x'"),
         (ERROR, math.inf, "a threshold of landing_error is a finite number, not inf"),
     ],

@@ -32,7 +32,7 @@ PACKAGE = '''
             return (
                 Metric("caught", "caught drops", kind="share", of=7, study=True),
                 Metric("spill", "spilt volume", os.environ.get("UNIT", "ml"), better="lower",
-                       resolution=0.01),
+                       resolution=0.01, least=0),
                 Metric("left", "way to the left", "m", better=None),
             )
 
@@ -179,7 +179,8 @@ GIVEN = """
     from pouring import Pouring
 
     GIVEN = {
-        "nan": Outcome({"spill": float("nan")}), "share": Outcome({"caught": 1.5}),
+        "rounded": Outcome({"spill": -1e-12}), "share": Outcome({"caught": 1.5}),
+        "nan": Outcome({"spill": float("nan")}), "less": Outcome({"spill": -1.0}),
         "text": Outcome({"spill": "7"}), "nothing": None, "typo": Outcome({"cauhgt": 1.0}),
     }
 
@@ -212,10 +213,12 @@ def test_an_outcome_that_no_record_can_hold_fails_its_test_and_no_other(
 ) -> None:
     pytester.makepyfile(test_it=GIVEN)
     result = run(pytester, "--reps=1", "--sim-output=a", ret=1)
-    result.assert_outcomes(passed=1, failed=7)  # and pytest-benchmark warns of none
+    result.assert_outcomes(passed=1, failed=9)  # and pytest-benchmark warns of none
     result.stdout.fnmatch_lines(
         ["FAIL mujoco, test_giving share: Failed: caught of pouring cannot be 1.5",
-         "FAIL mujoco, test_giving text: *: spill of pouring must be a number or None, not '7'",
+         "FAIL mujoco, test_giving nan: *spill of pouring must be a finite number or None, not nan",
+         "FAIL mujoco, test_giving less: *spill of pouring cannot be -1",
+         "FAIL mujoco, test_giving text: *pouring must be a finite number or None, not '7'",
          "FAIL mujoco, test_giving nothing: *perform() returns an Outcome, not NoneType",
          "FAIL mujoco, test_giving typo: *no metric is named 'cauhgt' in the outcome of pouring; "
          "did you mean 'caught'? *",
@@ -223,7 +226,7 @@ def test_an_outcome_that_no_record_can_hold_fails_its_test_and_no_other(
          "FAIL mujoco, test_task Kind: *metric 'caught': kind='shares'; choose from 'share', *",
          "FAIL mujoco, test_task Raising: ValueError: a mistake of mine"]
     )  # fmt: skip
-    assert [r["metrics"] for r in records("a")] == [{"spill": None}, *[{}] * 6]
+    assert [r["metrics"] for r in records("a")] == [{"spill": 0.0}, *[{}] * 8]
     told = result.stdout.str()
     assert "raise ValueError" in told
     assert "repeater.py" not in told  # nor any other line of ours before it

@@ -146,7 +146,9 @@ def test_starts_are_where_the_file_has_them_though_its_ground_is_elsewhere(
 def test_keyframes_that_are_not_there_end_the_run(pytester: pytest.Pytester, blocks: Path) -> None:
     pytester.makepyfile(TESTS.replace("starts.npz", "keyframes"))
     found = run_pytest(pytester, "--sim mujoco", ret=pytest.ExitCode.USAGE_ERROR)
-    assert f"{blocks} has no keyframes; name a file of starts, or none" in found.stdout.str()
+    why = f"{blocks} has no keyframes; name a file of starts, or none"
+    assert why in found.stdout.str()
+    assert why in run_pytest(pytester, "--sim mujoco -n 2", failed=1).stdout.str()
 
 
 @pytest.mark.engine

@@ -12,12 +12,14 @@ import pytest
 from pytest_simbench.scene import (
     Box,
     Capsule,
+    ConvexMesh,
     Cylinder,
     FloatArray,
     Pose,
     Scene,
     SceneError,
     Sphere,
+    principal,
 )
 from pytest_simbench.scene.plausibility import implausible
 from pytest_simbench.tasks import Jitter, LeaningTowers, Stacking, Throwing
@@ -177,3 +179,15 @@ def test_round_bodies_may_touch_and_not_sink() -> None:
     beside = [Pose.at(0.44 + into, 0.0, 0.05) for into in (0.019, 0.021)]
     found = [implausible(scene, states(scene, tin=pose)) for pose in beside]
     assert found == [None, "'can' and 'tin' overlap by 21 mm"]
+
+
+def test_a_body_reaches_down_as_far_as_it_does() -> None:
+    """A pyramid, whose top is farther from its centre of mass than its base."""
+    base = [(x, y, 0.0) for x in (-0.03, 0.03) for y in (-0.03, 0.03)]
+    vertices, frame = principal([*base, (0.0, 0.0, 0.15)])
+    standing = Scene("one", (ConvexMesh("pyramid", vertices, frame, 0.2),))
+    assert implausible(standing, states(standing)) is None
+    on_its_tip = Pose(quaternion=(0.0, 1.0, 0.0, 0.0)) * frame
+    for height, found in ((0.15, None), (0.09, "'pyramid' is 60 mm deep in the ground")):
+        pose = Pose.at(0.0, 0.0, height) * on_its_tip
+        assert implausible(standing, states(standing, pyramid=pose)) == found

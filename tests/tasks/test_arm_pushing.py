@@ -16,7 +16,7 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import ArmPushing
-from pytest_simbench.tasks.arm_pushing import compared, described
+from pytest_simbench.tasks.arm_pushing import TICK, compared, described, each_tick
 from tests.conftest import measured, performed
 
 URDF = """<robot name="arm">
@@ -93,3 +93,15 @@ def test_each_metric_is_of_its_axis_and_turns_are_within_half_a_turn() -> None:
     assert metrics["way_error"] == pytest.approx(share * np.hypot(0.02, 0.05), rel=0.01)
     turned = compared(way(0.1, 0.0, 175.0), way(0.1, 0.0, -175.0, rows=90))[0]
     assert turned["turn_error"] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize("step", [1 / 240, 0.008, 0.016])
+def test_a_motion_is_compared_at_the_times_of_the_recording(step: float) -> None:
+    time = np.arange(0.0, 1.0 + step / 2, step)
+    states = np.array([Pose.at(t, 0.0, 0.0, yaw=3.0 * t).as_array() for t in time])
+    rows = each_tick(time, states)
+    for k in (0, 1, 37, 99):
+        wanted = Pose.at(k * TICK, 0.0, 0.0, yaw=3.0 * k * TICK)
+        assert abs(np.dot(rows[k, 3:], wanted.quaternion)) == pytest.approx(1.0)
+        assert rows[k, :3] == pytest.approx(wanted.position, abs=step / 2)
+    assert len(rows) == 1 + round(time[-1] / TICK)
