@@ -1,4 +1,4 @@
-"""How many repetitions a claim or a comparison needs, and what a test lets pass."""
+"""How many repetitions a claim needs, and what a test lets pass."""
 
 from __future__ import annotations
 
@@ -55,24 +55,6 @@ def repetitions_for_proportion(
     if not leaves(MOST):
         return None
     return 1 + bisect_left(range(1, MOST), True, key=leaves)  # the width shrinks with n
-
-
-def repetitions_to_detect(
-    difference: float, std: float, *, power: float = 0.8, alpha: float = 0.05, paired: bool = False
-) -> int:
-    """Repetitions on each side that find a true difference of two means, one-sided as a gate asks.
-
-    Args:
-        difference: between the true means; above 0.
-        std: standard deviation between repetitions; of the differences where seeds pair.
-        power: probability of finding it.
-        alpha: probability of a false alarm.
-        paired: whether the two sides share their seeds.
-    """
-    from scipy.stats import norm
-
-    quantiles = float(norm.ppf(1 - alpha) + norm.ppf(power))
-    return max(2, math.ceil((1 if paired else 2) * (quantiles * std / difference) ** 2))
 
 
 def least_supported(threshold: float, metric: Metric, n: int, confidence: float) -> int | None:
