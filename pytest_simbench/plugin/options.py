@@ -220,9 +220,8 @@ def given(config: pytest.Config, name: str) -> bool:
 
 
 def _value(config: pytest.Config, item: Option) -> Any:
-    where, raw = config.stash.get(FLAGS, {}).get(item.name, item.flag), None
     if given(config, item.name):
-        raw = getattr(config.option, item.dest)
+        where, raw = config.stash[FLAGS][item.name], getattr(config.option, item.dest)
     else:
         where, raw = _ini(config, item)
     if raw is None or raw is True:  # True: a flag, or an option that stands without a value
