@@ -7,7 +7,8 @@
     NAME/pose         of that free body, (n, 7), as in a file of starts; not in `.csv`
 
 An `.npz` file may have `position`, `velocity` and `effort` (n, joints) instead, in the order of the
-scene. Of an `.mcap` file `/joint_states` and `/tf` are read, as `recordings.bag` writes them.
+scene. Both count as the scene's file does. Of an `.mcap` file `/joint_states` and `/tf` are read,
+as `recordings.bag` writes them.
 """
 
 from __future__ import annotations
@@ -147,11 +148,7 @@ def _npz(path: Path, scene: Scene) -> Columns:
                 told = f"of {array.shape[1]} joints, and the scene has {len(names)}"
                 raise ValueError(f"holds {whole!r} {told}: {', '.join(names)}")
             found |= {f"{name}{part}": array[:, k] for k, name in enumerate(names)}
-    for body in scene.free_bodies:
-        array = found.get(f"{body.name}/pose", np.zeros(0))
-        if array.shape[1:] == (7,) and array.dtype.kind in "fiu":
-            found[f"{body.name}/pose"] = array + np.eye(7)[2] * scene.file_lift
-    return found
+    return _from_file(found, scene)
 
 
 def _csv(path: Path, scene: Scene) -> Columns:
@@ -168,7 +165,18 @@ def _csv(path: Path, scene: Scene) -> Columns:
     except (ValueError, csv.Error) as error:
         raise ValueError(f"cannot be read, line {rows.line_num}: {error}") from None
     columns = np.array(found, dtype=float).reshape(len(found), len(names)).T
-    return dict(zip(names, columns, strict=True))
+    return _from_file(dict(zip(names, columns, strict=True)), scene)
+
+
+def _from_file(columns: Columns, scene: Scene) -> Columns:
+    """What counts as the scene's file does, counted as the scene does."""
+    joints = scene.robot.joints if scene.robot else ()
+    moved = {j.name + part: np.array(-j.file_zero) for j in joints for part in ("", "/command")}
+    moved |= {f"{body.name}/pose": np.eye(7)[2] * scene.file_lift for body in scene.free_bodies}
+    for name, array in columns.items():
+        if name in moved and array.shape[1:] == moved[name].shape and array.dtype.kind in "fiu":
+            columns[name] = array + moved[name]
+    return columns
 
 
 def _mcap(path: Path, scene: Scene) -> Columns:

@@ -55,9 +55,10 @@ class Joint(Wire):
         rest: position at which that spring is without load [rad], or [m].
         gravity: share of the scene's gravity that the link which it moves feels; 0: its weight is
             compensated. At most 1: engines may pass over more.
+        file_zero: position that its file gives it where it is at 0 here [rad], or [m].
     """
 
-    optional = ("passive_damping", "friction", "spring", "rest", "gravity")
+    optional = ("passive_damping", "friction", "spring", "rest", "gravity", "file_zero")
 
     name: str
     stiffness: float
@@ -70,6 +71,7 @@ class Joint(Wire):
     spring: float = 0.0
     rest: float = 0.0
     gravity: float = 1.0
+    file_zero: float = 0.0
 
     def __post_init__(self) -> None:
         check_name(self.name, "a joint")

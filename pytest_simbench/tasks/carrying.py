@@ -39,11 +39,11 @@ from pytest_simbench.scene import (
     Trajectory,
     principal,
 )
-from pytest_simbench.scene.checks import check_choice
+from pytest_simbench.scene.checks import check_choice, check_number
 from pytest_simbench.tasks.arm import LostBody
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task, distance
 from pytest_simbench.tasks.manipulator import APPROACH, Manipulator
-from pytest_simbench.tasks.resting import FORCE_JITTER, RESTLESS, calm, rates, spread
+from pytest_simbench.tasks.resting import FORCE_JITTER, RESTLESS, SHORTEST, calm, rates, spread
 
 Shape = Literal["cube", "ball", "tube", "pill", "prism"]
 
@@ -87,6 +87,7 @@ class Carrying(Task):
 
     def __post_init__(self) -> None:
         check_choice(self.shape, f"the shape of {self.name}", get_args(Shape))
+        check_number(self.still, f"the still time [s] of {self.name}", SHORTEST)
 
     @property
     def arm(self) -> Robot:
@@ -124,7 +125,7 @@ class Carrying(Task):
         return self.load * most / (-STANDARD_GRAVITY[2] + ACCELERATION)
 
     def smoke(self) -> Carrying:
-        return replace(self, still=1.0)
+        return replace(self, still=SHORTEST)
 
     def problem(self) -> str | None:
         """The hand cannot hold the thing, or cannot come down to it or carry it aside."""

@@ -10,9 +10,10 @@ import numpy as np
 from pytest_simbench.client.world import World
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import FloatArray, Trajectory
+from pytest_simbench.scene.checks import check_number
 from pytest_simbench.tasks.base import Count, Outcome
 from pytest_simbench.tasks.on_scene import FARTHEST, OnJoints, places, started, ways
-from pytest_simbench.tasks.resting import LOG_PERIOD, RESTLESS, rates, rest
+from pytest_simbench.tasks.resting import LOG_PERIOD, RESTLESS, SHORTEST, rates, rest
 
 
 @dataclass(frozen=True)
@@ -22,15 +23,19 @@ class Holding(OnJoints):
     Attributes:
         world: the scene. Repetitions go through its `starts` (keyframes); without any, each joint
             is held where it is written.
-        seconds: simulated time [s].
+        seconds: simulated time, 1 at least [s].
 
     Raises:
-        SceneError: the scene has no joints.
+        SceneError: the scene has no joints, or the time is too short.
     """
 
     name: ClassVar[str] = "holding"
 
     seconds: float = 2.5
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_number(self.seconds, f"the time [s] of {self.name}", SHORTEST)
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -42,7 +47,7 @@ class Holding(OnJoints):
         )
 
     def smoke(self) -> Holding:
-        return replace(self, seconds=min(self.seconds, 1.0))
+        return replace(self, seconds=SHORTEST)
 
     def parameters(self) -> dict[str, Any]:
         return super().parameters() | {"task.seconds": self.seconds}

@@ -18,9 +18,9 @@ from pytest_simbench.client.world import World
 from pytest_simbench.description.urdf import Link
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Compound, ConvexMesh, Pose, Scene, principal
-from pytest_simbench.scene.checks import check_count
+from pytest_simbench.scene.checks import check_count, check_number
 from pytest_simbench.tasks.base import Count, Jitter, Moment, Outcome, Randomness, Task
-from pytest_simbench.tasks.resting import RESTLESS, rates, rest
+from pytest_simbench.tasks.resting import RESTLESS, SHORTEST, rates, rest
 from pytest_simbench.tasks.settling import tilted
 
 WALLS, LEAN = 8, math.radians(30.0)
@@ -64,6 +64,7 @@ class Nesting(Task):
 
     def __post_init__(self) -> None:
         check_count(self.bowls, f"the number of bowls of {self.name}")
+        check_number(self.settle, f"the time [s] of {self.name}", SHORTEST)
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -78,7 +79,7 @@ class Nesting(Task):
         )  # fmt: skip
 
     def smoke(self) -> Nesting:
-        return replace(self, bowls=2, settle=1.0)
+        return replace(self, bowls=2, settle=SHORTEST)
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         rng, (bowl, bottom) = Randomness.of(seed).start, a_bowl()

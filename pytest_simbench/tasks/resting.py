@@ -16,6 +16,9 @@ from pytest_simbench.scene import FloatArray, Scene
 RESTLESS = 0.5
 """The last seconds over which it is measured how calmly things rest [s]."""
 
+SHORTEST = 2 * RESTLESS
+"""For things to come to rest, those last seconds included [s]."""
+
 LOG_PERIOD = 0.01
 """Between two samples of a motion [s]."""
 
@@ -33,9 +36,9 @@ Forces = Mapping[tuple[str, str], FloatArray]
 
 
 def rest(world: World, seconds: float, phase: str) -> Motion:
-    """Wait for so long [s] and return the motion of the last `RESTLESS`."""
+    """Wait for so long [s], `SHORTEST` at least, and return the motion of the last `RESTLESS`."""
     with world.phase(phase):
-        world.wait(max(seconds - RESTLESS, RESTLESS))
+        world.wait(seconds - RESTLESS)
     with world.phase("rest"):
         return world.wait(RESTLESS, log_period=LOG_PERIOD)
 
@@ -44,7 +47,7 @@ def calm(world: World, seconds: float, phase: str) -> tuple[Motion, list[Forces]
     """The same, and the forces of contacts now and then in that motion; none where the simulator
     does not tell them of this scene."""
     with world.phase(phase):
-        world.wait(max(seconds - RESTLESS, RESTLESS))
+        world.wait(seconds - RESTLESS)
     parts: list[Motion] = []
     forces: list[Forces] = []
     began = world.time

@@ -14,11 +14,12 @@ from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Body, FloatArray, Pose, Scene, SceneError, Start
+from pytest_simbench.scene.checks import check_number
 from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from pytest_simbench.tasks.on_scene import FARTHEST, OnScene, places, started, ways
-from pytest_simbench.tasks.resting import FORCE_JITTER, RESTLESS, calm, spread
+from pytest_simbench.tasks.resting import FORCE_JITTER, RESTLESS, SHORTEST, calm, spread
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Settling(OnScene):
         world: the scene, of a file (`scene_file`) or made by hand. Repetitions go through its
             `starts`, if it has some.
         premises: what should be true at the end.
-        seconds: simulated time [s].
+        seconds: simulated time, 1 at least [s].
         moved: each free body starts elsewhere by at most this in x and in y, by chance [m]; so does
             each slider in its range, and each hinge by so many rad: what is 1 m from its axis moves
             as far.
@@ -72,6 +73,7 @@ class Settling(OnScene):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "premises", tuple(self.premises))
+        check_number(self.seconds, f"the time [s] of {self.name}", SHORTEST)
         if self.world.robot is None and not self.world.free_bodies:
             raise SceneError(
                 f"scene {self.world.name!r} has nothing that moves, so nothing settles"
@@ -105,7 +107,7 @@ class Settling(OnScene):
         )  # fmt: skip
 
     def smoke(self) -> Settling:
-        return replace(self, seconds=min(self.seconds, 1.0))
+        return replace(self, seconds=SHORTEST)
 
     def parameters(self) -> dict[str, Any]:
         return super().parameters() | {

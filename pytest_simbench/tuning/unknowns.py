@@ -12,6 +12,7 @@ import numpy as np
 from pytest_simbench.description.robot_files import description_xml, keep
 from pytest_simbench.description.urdf import INERTIA, PreparedRobot
 from pytest_simbench.scene import Robot, Scene, Start
+from pytest_simbench.scene.pose import vector3
 from pytest_simbench.scene.robot import FREE
 from pytest_simbench.tasks import Log
 from pytest_simbench.tasks.base import distance
@@ -125,8 +126,9 @@ def _check_told(name: str, scene: Scene, log: Log) -> None:
 
 
 def changed(scene: Scene, values: Mapping[str, float]) -> Scene:
-    """The scene with other values of what is sought."""
-    for label, value in values.items():
+    """The scene with other values of what is sought. With a mass change the inertia, what bears a
+    share of the weight, and the rates of damping, which a file says as a force and a torque."""
+    for label, value in sorted(values.items(), reverse=True):  # a mass before rates of damping
         kind, _, name = label.partition(":")
         scene = _changed(scene, kind, name, value)
     return scene
@@ -140,8 +142,13 @@ def _changed(scene: Scene, kind: str, name: str, value: float) -> Scene:
         if kind == "friction":
             return scene.with_body(body.with_friction(value))
         change: dict[str, Any] = {kind: value}
-        if kind == "mass" and body.moments is not None:
-            change["moments"] = tuple(value / body.mass * moment for moment in body.moments)
+        if kind == "mass":
+            factor = value / body.mass
+            change |= {k: getattr(body, k) / factor for k in OF_BODIES if "damping" in k}
+            borne = (replace(w, force=vector3(factor * np.array(w.force))) for w in body.wrenches)
+            change["wrenches"] = tuple(borne)
+            if body.moments is not None:
+                change["moments"] = tuple(factor * moment for moment in body.moments)
         return scene.with_body(body.changed(**change))
     robot = scene.arm
     if kind in OF_BODIES:

@@ -237,8 +237,9 @@ class Tree:
             passive_damping=float(np.ravel(model.dof_damping[dof])[0]) + drive.resistance,
             friction=float(model.dof_frictionloss[dof]),
             spring=float(np.ravel(model.jnt_stiffness[joint])[0]),
-            rest=float(model.qpos_spring[at] - model.qpos0[at]),
+            rest=float(model.qpos_spring[at]) - drive.zero,
             gravity=1.0 - self.reading.compensated(link.body),
+            file_zero=drive.zero,
         )
 
     def _tell(self, frictions: FloatArray) -> None:
@@ -246,6 +247,8 @@ class Tree:
         names = [link.told for link in self.links]
         told = "joint pos, axis, range, armature, damping, frictionloss, stiffness, springref"
         tell(told, CARRIED, f"{len(names)} hinges and sliders", names)
+        if shifted := [k.told for k, d in zip(self.links, self.drives, strict=True) if d.zero]:
+            tell("joint ref", CARRIED, "it is 0 here; logs (.npz, .csv) are moved by it", shifted)
         borne = [b for b in range(1, self.model.nbody) if self.reading.root(b) in self._bodies]
         if self.model.body_gravcomp[borne].any():
             reason = "links feel the rest of gravity"

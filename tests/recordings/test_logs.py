@@ -185,6 +185,15 @@ def test_a_table_that_cannot_be_is_told_with_its_line(tmp_path: Path, text: str,
         read_log(table(tmp_path, text), SCENE)
 
 
+def test_a_table_counts_joints_from_where_its_file_does(tmp_path: Path) -> None:
+    joints = SCENE.arm.with_joints("hinge", "slider", file_zero=0.5)
+    text = "time,hinge,slider,slider/command,slider/velocity\n0,0,1,1,1\n1,1,1,2,1\n"
+    log = read_log(table(tmp_path, text), replace(SCENE, robot=joints))
+    assert log.start.positions == (-0.5, 0.5)
+    assert log.trajectory.position.tolist() == [[-0.5, 0.5], [0.5, 1.5]]
+    assert log.trajectory.velocity.tolist() == [[0.0, 1.0], [0.0, 1.0]]
+
+
 def test_what_is_no_log_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(DescriptionError, match=r"log.txt is no log; give .npz, .csv, .mcap"):
         read_log(tmp_path / "log.txt", SCENE)

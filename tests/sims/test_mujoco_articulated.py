@@ -318,6 +318,12 @@ def test_a_keyframe_has_joints_and_what_their_drives_are_told(kitchen: Path) -> 
     assert start.poses[0].position == (0.0, 0.0, 0.5)
 
 
+def test_where_the_file_counts_a_joint_from_is_kept_and_told(kitchen: Path) -> None:
+    reading = changed(kitchen, 'name="slide"', 'name="slide" ref=".1"')
+    assert reading.scene.arm.column("file_zero") == pytest.approx([0.1, 0.0, 0.0])
+    assert "joint ref" in {line.quantity for line in reading.account}
+
+
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [

@@ -12,7 +12,7 @@ import pytest
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Compound, Pose, Scene, SceneError, Start
-from pytest_simbench.tasks import Jitter, Settling, rests_on
+from pytest_simbench.tasks import Carrying, Holding, Jitter, Nesting, Settling, Task, rests_on
 from pytest_simbench.tasks.resting import spread
 from pytest_simbench.tasks.settling import deepest, kinetic_energy, tilted
 from tests.conftest import performed
@@ -96,6 +96,17 @@ def test_repetitions_go_through_starts_which_are_in_the_file_s_frames() -> None:
 def test_what_it_cannot_do_is_one_sentence(scene: Scene, premises: list[Any], message: str) -> None:
     with pytest.raises(SceneError, match=message):
         Settling(scene, premises)
+
+
+@pytest.mark.parametrize(
+    ("task", "of"),
+    [(Settling(SCENE), "seconds"), (Holding(Scene("arm", (), ROBOT)), "seconds"),
+     (Nesting(), "settle"), (Carrying(), "still")],
+)  # fmt: skip
+def test_a_time_too_short_to_rest_in_is_refused(task: Task, of: str) -> None:
+    for seconds in (0.9, -3.0, np.nan):
+        with pytest.raises(SceneError, match=rf"time \[s\] of {task.name} is .* from 1 to"):
+            replace(task, **{of: seconds})  # type: ignore[arg-type]
 
 
 def test_energy_is_that_of_motion_and_of_spin_about_the_body_s_own_axes() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pytest_simbench.description.urdf import PreparedRobot
-from pytest_simbench.scene import Box, Pose, Start, Trajectory
+from pytest_simbench.scene import Box, Pose, Start, Trajectory, Wrench
 from pytest_simbench.tasks import Log
 from pytest_simbench.tuning.target import TuningError
 from pytest_simbench.tuning.unknowns import Unknown, begun, changed, known, starts, unknowns
@@ -34,6 +34,15 @@ def test_the_inertia_changes_with_the_mass() -> None:
     (door,) = [link for link in PreparedRobot(after.robot).links.values() if link.name == "door"]
     assert door.mass == pytest.approx(3.0)
     assert door.inertia == pytest.approx(3 * np.eye(3))
+
+
+def test_what_a_file_says_of_gravity_and_damping_goes_with_the_mass() -> None:
+    """It compensates a share of the weight, and damps by a force and a torque."""
+    borne = BLOCK.changed(wrenches=(Wrench(force=(0, 0, 6)),), angular_damping=3.0)
+    sought = {"linear_damping:block": 4.0, "mass:block": 4.0}
+    block = changed(replace(WHOLE, bodies=(borne,)), sought).body("block")
+    assert block.wrenches[0].force == (0, 0, 12)
+    assert (block.mass, block.linear_damping, block.angular_damping) == (4.0, 4.0, 1.5)
 
 
 def test_ranges_are_a_tenth_to_ten_times_where_nobody_says() -> None:
