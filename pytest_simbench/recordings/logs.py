@@ -77,6 +77,7 @@ def _log(columns: Columns, scene: Scene, robot: Robot | None) -> Log:
     joints, parts = robot.joint_names if robot else (), ("", "/velocity", "/effort", "/command")
     places = {name + part: (p, k) for p, part in enumerate(parts) for k, name in enumerate(joints)}
     bodies = {f"{body.name}/pose": body.name for body in scene.free_bodies}
+    known = ", ".join((*joints, *bodies))
     time = _numbers("time", columns.pop("time", np.zeros(0)))
     if time.ndim > 1 or len(time) < 2:
         raise ValueError("has no column 'time' of two rows or more [s]")
@@ -93,7 +94,6 @@ def _log(columns: Columns, scene: Scene, robot: Robot | None) -> Log:
     seen = {"time": time - time[0]}
     for name, raw in sorted(columns.items()):
         if name not in places and name not in bodies:
-            known = ", ".join((*joints, *bodies))
             raise ValueError(
                 f"holds {name!r:.80}, which scene {scene.name!r} has not; it has {known}"
             )
@@ -114,7 +114,6 @@ def _log(columns: Columns, scene: Scene, robot: Robot | None) -> Log:
         poses[bodies[name]] = array
     named = [name for name in joints if name in columns]
     if not named and not poses:
-        known = ", ".join((*joints, *bodies))
         raise ValueError(f"has positions of no joint and no body; the scene has {known}")
     ends = PreparedRobot(robot).limits if robot else {}
     first = [float(np.clip(at, *ends[name])) for name, at in zip(joints, rows[0, 0], strict=True)]

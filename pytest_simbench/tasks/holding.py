@@ -9,7 +9,7 @@ import numpy as np
 
 from pytest_simbench.client.world import World
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.scene import FloatArray, Trajectory
+from pytest_simbench.scene import FloatArray, Start, Trajectory
 from pytest_simbench.scene.checks import check_number
 from pytest_simbench.tasks.base import Count, Outcome
 from pytest_simbench.tasks.on_scene import FARTHEST, OnJoints, places, started, ways
@@ -54,12 +54,9 @@ class Holding(OnJoints):
 
     def commands(self, seed: int) -> tuple[FloatArray, FloatArray]:
         """What the drives are told: positions, (n_joints,) [rad or m], and efforts [N m or N]."""
-        start = self.start(seed)
-        written, none = self.world.arm.column("initial_position"), np.zeros(len(self.joints))
-        if start is None:
-            return written, none
-        targets = start.targets or start.positions
-        return (np.array(targets) if targets else written), np.array(start.efforts or none)
+        start = self.start(seed) or Start((), ())
+        targets = start.targets or start.positions or self.world.arm.column("initial_position")
+        return np.array(targets), np.array(start.efforts or np.zeros(len(self.joints)))
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         before, (targets, efforts) = world.joints[0], self.commands(seed)

@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.world import World
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.urdf import PreparedRobot
@@ -151,11 +150,13 @@ class Settling(OnScene):
         gone = ways(before, after)
         tilts = {name: tilted(before[name], pose) for name, pose in after.items()}
         failed = [str(p) for p in self.premises if not _holds(p, bodies, tilts)]
+        ends = {body.name: body.moved_to(world.pose(body.name)) for body in scene.free_bodies}
+        squares = np.sum(rest.bodies[:, :, 7:10] ** 2, axis=2)  # of speeds
         metrics: dict[str, float | None] = {
             "farthest": max(gone.values()),
             "tilt": max(tilts.values()),
-            "sunk": 1000 * deepest(scene, _ends(world)),
-            "restless": 1000 * _speed(rest) if bodies else None,
+            "sunk": 1000 * deepest(scene, ends),
+            "restless": 1000 * float(np.sqrt(np.mean(squares))) if bodies else None,
             "energy": 1e6 * kinetic_energy(scene, rest.bodies) if bodies else None,
             "force_jitter": spread(scene, forces),
         }
@@ -204,10 +205,6 @@ def _holds(premise: RestsOn, ends: Mapping[str, Pose], tilts: Mapping[str, float
     return bool(beside <= premise.within and above and tilts[premise.body] <= premise.tilt)
 
 
-def _ends(world: World) -> dict[str, Body]:
-    return {body.name: body.moved_to(world.pose(body.name)) for body in world.scene.free_bodies}
-
-
 def deepest(scene: Scene, ends: Mapping[str, Body]) -> float:
     """How deep any free body is in another body or in the ground [m], of pairs that collide; 0
     where none is."""
@@ -224,8 +221,3 @@ def deepest(scene: Scene, ends: Mapping[str, Body]) -> float:
             if not scene.kept_apart(own, f"body/{other.name}")
         ]
     return max(depths)
-
-
-def _speed(motion: Motion) -> float:
-    """Root mean square of the speeds of all bodies in a motion [m/s]."""
-    return float(np.sqrt(np.mean(np.sum(motion.bodies[:, :, 7:10] ** 2, axis=2))))
