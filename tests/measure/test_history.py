@@ -48,6 +48,20 @@ def test_what_changed_with_which_release() -> None:
     assert len(told) == 2
 
 
+def test_each_task_of_a_test_has_a_history_of_its_own() -> None:
+    found = [
+        replace(r, settings={"task.levels": levels})
+        for levels, last in ((3, 0.6), (5, 1.0))
+        for version, placed in (("1", 1.0), ("2", 1.0), ("3", last), ("4", last))
+        for r in release(version, placed)
+    ]
+    told = {h.variant: h.sentences()[0][:22] for h in histories(found, {"stacking": METRICS})}
+    assert told == {
+        "headless tuned task.levels=3": "placed fell with 3: 96",
+        "headless tuned task.levels=5": "no change is supported",
+    }
+
+
 @pytest.mark.parametrize(("more", "tiny"), [(10, 0.0), (0, 1e-7)])
 def test_what_the_machine_or_rounding_makes_is_not_told(more: int, tiny: float) -> None:
     """A small change of a cost, and the last digits of a deterministic engine."""
