@@ -77,15 +77,17 @@ def _read(names: Sequence[str]) -> tuple[Folders, dict[str, RunContents]]:
     return folders, readings
 
 
-def _outcome(folders: Folders) -> tuple[RunOutcome, list[str]]:
+def _outcome(folders: Folders, readings: dict[str, RunContents]) -> tuple[RunOutcome, list[str]]:
     """How runs ended together, and what is wrong with what says so. Whether the tests passed is not
-    known where one run does not know, and a comparison is that of one run alone."""
+    known where one run does not know or where one has claims: parts may be too small to decide what
+    the whole decides. A comparison is that of one run alone."""
     found = [RunOutcome.read(folder.path) for folder in folders.values()]
     outcomes, wrong = [outcome for outcome, _ in found], [text for _, text in found if text]
     if len(outcomes) == 1:
         return outcomes[0], wrong
     passed = [outcome.passed for outcome in outcomes]
-    together = False if False in passed else None if None in passed else True
+    unknown = None in passed or any(reading.claims for reading in readings.values())
+    together = False if False in passed else None if unknown else True
     return RunOutcome(together, looks=max(outcome.looks for outcome in outcomes)), wrong
 
 
@@ -125,7 +127,7 @@ def merge_runs(
             folder.describe(task)
         refused = _copy(records, folders, folder)
         unsaved = folder.flush()
-        found, wrong = _outcome(folders)
+        found, wrong = _outcome(folders, readings)
         outcome = RunOutcome(found.passed, looks=found.looks)
         problems = [*_problems(readings), *refused, *unsaved, *wrong]
         problems.append(write_outcome(folder.path, outcome))
@@ -153,7 +155,7 @@ def report_runs(
     (first, folder), *others = folders.items()
     run = None if others else folder.path
     reading = _merged(readings)[1] if others else readings[first]
-    outcome, wrong = _outcome(folders)
+    outcome, wrong = _outcome(folders, readings)
     tables, untold = ([], []) if run is None else write_tables(run, target)
     if not (reading.records or tables or untold):
         raise BadInput(f"{first}: it holds no repetition")
