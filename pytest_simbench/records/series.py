@@ -19,8 +19,6 @@ from pytest_simbench.records.configuration import (
 )
 from pytest_simbench.records.record import Record
 
-TWIN = equal_to("twin")
-
 T = TypeVar("T")
 K = TypeVar("K")
 
@@ -34,7 +32,7 @@ def settled(records: Iterable[Record]) -> list[Record]:
     found: list[Record] = []
     places: dict[tuple[object, ...], list[int]] = {}
     for record in records:
-        key = tuple(getattr(record, name) for name in TWIN)
+        key = tuple(getattr(record, name) for name in equal_to("twin"))
         twins = places.setdefault(key, [])
         for place in twins:
             if agree(found[place], record):
@@ -168,9 +166,14 @@ def _keys(known: Sequence[Mapping[str, object]]) -> list[str]:
 
 def labels(runs: Sequence[Sequence[Sequence[Record]]]) -> list[list[str]]:
     """What tells the configurations of each run apart, in words that match between the runs, which
-    may be of other versions."""
+    may be of other versions; what one of a run cannot know, which never started, tells nothing."""
     every = [[told(group) for group in run] for run in runs]
-    keys = dict.fromkeys(k for known in every for k in _keys(known) if field_of(k) != "versions")
+    keys = dict.fromkeys(
+        key
+        for known in every
+        for key in _keys(known)
+        if field_of(key) != "versions" and all(key in one for one in known)
+    )
     return [[" ".join(_difference(k, one.get(k)) for k in keys) for one in run] for run in every]
 
 
@@ -179,7 +182,6 @@ MOST = 3
 
 ROBOT = "robot.name"
 """What tells robots apart; their scenes, sizes and files differ with it."""
-
 
 SCENE = "scene"
 """A digest: it tells nobody anything where a parameter tells as much."""
@@ -256,19 +258,18 @@ def _numbered(runs: Sequence[Sequence[list[Record]]]) -> list[dict[int, list[Rec
     known: list[tuple[str, str]] = []
     sides = []
     for run, names in zip(runs, labels(runs), strict=True):
-        keys = [(name, task_parameters(g[0])) for name, g in zip(names, run, strict=True)]
-        numbers: dict[int, int] = {}
+        side: dict[int, list[Record]] = {}
+        rest = {k: (name, task_parameters(run[k][0])) for k, name in enumerate(names)}
         for first in range(3):  # the place in a key from which on two must be equal
-            for place, key in enumerate(keys):
+            for place, key in [*rest.items()]:
                 alike = (k for k, other in enumerate(known, 1) if other[first:] == key[first:])
-                free = [k for k in alike if k not in numbers.values()]
-                if free and place not in numbers:
-                    numbers[place] = free[0]
-        for place, key in enumerate(keys):
-            if place not in numbers:
-                known.append(key)
-                numbers[place] = len(known)
-        sides.append({numbers[place]: group for place, group in enumerate(run)})
+                if number := next((k for k in alike if k not in side), None):
+                    side[number] = run[place]
+                    del rest[place]
+        for place, key in rest.items():
+            known.append(key)
+            side[len(known)] = run[place]
+        sides.append(side)
     return sides
 
 
