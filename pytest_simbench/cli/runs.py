@@ -77,15 +77,19 @@ def _read(names: Sequence[str]) -> tuple[Folders, dict[str, RunContents]]:
     return folders, readings
 
 
-def _outcome(folders: Folders) -> tuple[RunOutcome, list[str]]:
-    """How runs ended together, and what is wrong with what says so. Whether the tests passed is not
-    known where one run does not know, and a comparison is that of one run alone."""
+def _outcome(folders: Folders, readings: dict[str, RunContents]) -> tuple[RunOutcome, list[str]]:
+    """How runs ended together, and what is wrong with their files. Whether the tests passed is not
+    known where one run does not know or where one has claims: parts may be too small to decide what
+    the whole decides. A comparison is that of one run alone."""
     found = [RunOutcome.read(folder.path) for folder in folders.values()]
-    outcomes, wrong = [outcome for outcome, _ in found], [text for _, text in found if text]
+    wrong = [text for reading in readings.values() for text in reading.problems]
+    wrong += [text for _, text in found if text]
+    outcomes = [outcome for outcome, _ in found]
     if len(outcomes) == 1:
         return outcomes[0], wrong
     passed = [outcome.passed for outcome in outcomes]
-    together = False if False in passed else None if None in passed else True
+    unknown = None in passed or any(reading.claims for reading in readings.values())
+    together = False if False in passed else None if unknown else True
     return RunOutcome(together, looks=max(outcome.looks for outcome in outcomes)), wrong
 
 
@@ -125,10 +129,9 @@ def merge_runs(
             folder.describe(task)
         refused = _copy(records, folders, folder)
         unsaved = folder.flush()
-        found, wrong = _outcome(folders)
+        found, wrong = _outcome(folders, readings)
         outcome = RunOutcome(found.passed, looks=found.looks)
-        problems = [*_problems(readings), *refused, *unsaved, *wrong]
-        problems.append(write_outcome(folder.path, outcome))
+        problems = [*wrong, *refused, *unsaved, write_outcome(folder.path, outcome)]
         if any(reading.claims for reading in readings.values()):
             problems.append(f"pytest --sim-resume={folder.path} judges the claims of the whole")
         written = _show(folder.read(), outcome, folder.path, folder.path, verbose, problems, **more)
@@ -153,12 +156,11 @@ def report_runs(
     (first, folder), *others = folders.items()
     run = None if others else folder.path
     reading = _merged(readings)[1] if others else readings[first]
-    outcome, wrong = _outcome(folders)
+    outcome, wrong = _outcome(folders, readings)
     tables, untold = ([], []) if run is None else write_tables(run, target)
     if not (reading.records or tables or untold):
         raise BadInput(f"{first}: it holds no repetition")
-    problems = [*_problems(readings), *wrong]
-    written = _show(reading, outcome, run, target, verbose, problems, **more)
+    written = _show(reading, outcome, run, target, verbose, wrong, **more)
     width = shutil.get_terminal_size().columns
     if outcome.compared is not None:
         name, gate = outcome.compared
@@ -170,10 +172,6 @@ def report_runs(
     if target is not None and written.complete:
         print(where(target / PAGE_NAME, Path.cwd()))
     return 0 if written.complete else 1
-
-
-def _problems(readings: dict[str, RunContents]) -> list[str]:
-    return [text for reading in readings.values() for text in reading.problems]
 
 
 def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, str]]:

@@ -61,9 +61,14 @@ class Change:
     normalised: bool = False
 
     @property
+    def beyond(self) -> bool:
+        """Whether it got worse by more than the limit; 1 - 0.95 is not more than 0.05."""
+        return self.loss > self.limit.amount * (1 + 1e-9)
+
+    @property
     def exceeded(self) -> bool:
-        """Whether it got worse by more than the limit, and not by chance."""
-        return self.loss > self.limit.amount and self.significant
+        """Whether it did so, and not by chance."""
+        return self.beyond and self.significant
 
     @property
     def significant(self) -> bool:

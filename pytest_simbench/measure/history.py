@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 from pytest_simbench.ground.versions import BUILD, RELEASE, VersionedName, release_numbers
 from pytest_simbench.measure.change_points import ChangePoint, change_points, steps
@@ -20,7 +21,7 @@ from pytest_simbench.measure.speed import without_speed
 from pytest_simbench.records.metrics import CRASHED, Metric, significant
 from pytest_simbench.records.phenomena import PHENOMENON, ordered
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import RowKey, grouped, series
+from pytest_simbench.records.series import RowKey, grouped, labels, series
 
 FEWEST = 3
 """Releases that make a history of a task; two are compared by verdicts."""
@@ -124,14 +125,22 @@ class TaskHistory(History):
 
 def by_release(records: Iterable[Record]) -> dict[tuple[str, RowKey], dict[str, list[Record]]]:
     """The rows of each task by the release or build that they are of. What all releases of a
-    simulator have in common is their task, and their key with the simulator's name alone."""
+    simulator have in common is their task, and their key with the simulator's name alone and, among
+    its parameters, what tells apart the rows that one release has of it."""
     found: dict[tuple[str, RowKey], dict[str, list[Record]]] = {}
     for task, of_task in grouped(records, lambda r: r.task).items():
-        for row in series(of_task):
-            name = VersionedName.of(row.key.simulator)
-            label = name.which if name.kind == RELEASE else f"{BUILD}{name.which}"
-            of_all = found.setdefault((task, row.key._replace(simulator=name.base)), {})
-            of_all[label] = row.records
+        rows = grouped(
+            series(of_task), lambda row: (VersionedName.of(row.key.simulator).base, *row.key[1:])
+        )
+        for alike in rows.values():
+            releases = [*grouped(alike, lambda row: row.key.simulator).values()]
+            told = labels([[row.records for row in of_one] for of_one in releases])
+            for row, more in zip(chain(*releases), chain(*told), strict=True):
+                name = VersionedName.of(row.key.simulator)
+                label = name.which if name.kind == RELEASE else f"{BUILD}{name.which}"
+                parameters = " ".join(filter(None, (row.key.parameters, more)))
+                key = row.key._replace(simulator=name.base, parameters=parameters)
+                found.setdefault((task, key), {})[label] = row.records
     return found
 
 

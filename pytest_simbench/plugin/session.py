@@ -43,6 +43,7 @@ class SimSession:
         self._failed: list[dict[str, Any]] = []
         self._passed: set[str] = set()
         self._xfailed: set[str] = set()
+        self._exit_status: int = pytest.ExitCode.OK
 
     @cached_property
     def selection(self) -> Selection:
@@ -244,6 +245,7 @@ class SimSession:
                 session.exitstatus = pytest.ExitCode.TESTS_FAILED
         if self.begun:
             self.run.check_thresholds(session)
+        self._exit_status = session.exitstatus  # pytest gives the summary the one of before
 
     @pytest.hookimpl(optionalhook=True, wrapper=True)
     def pytest_benchmark_group_stats(self) -> Generator[None, Any, Any]:
@@ -254,16 +256,15 @@ class SimSession:
         return shown(self.config, (yield))
 
     @pytest.hookimpl(trylast=True)  # what is printed last is read first
-    def pytest_terminal_summary(
-        self, terminalreporter: pytest.TerminalReporter, exitstatus: int
-    ) -> None:
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """Print the result, write the report, and say last where it is."""
         if self.in_worker:  # an xdist worker has a reporter too, which nobody reads
             return
         if self.begun:
-            if exitstatus == pytest.ExitCode.INTERRUPTED:
+            if self._exit_status == pytest.ExitCode.INTERRUPTED:
                 self.run.tell_how_to_go_on()
-            self.run.summarise(terminalreporter, self.comparison, exitstatus == pytest.ExitCode.OK)
+            passed = self._exit_status == pytest.ExitCode.OK
+            self.run.summarise(terminalreporter, self.comparison, passed)
         if self.comparison:
             terminalreporter.write_sep("=", "comparison with the baseline")
             terminalreporter.write_line(self.comparison.text(terminalreporter._tw.fullwidth))

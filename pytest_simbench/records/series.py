@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import chain
 from typing import NamedTuple, TypeVar
 
 from pytest_simbench.ground.versions import VersionedName, release_numbers
@@ -12,11 +13,11 @@ from pytest_simbench.records.configuration import (
     agree,
     bare,
     equal_to,
+    field_of,
+    task_parameters,
     text,
 )
 from pytest_simbench.records.record import Record
-
-TWIN = equal_to("twin")
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -31,7 +32,7 @@ def settled(records: Iterable[Record]) -> list[Record]:
     found: list[Record] = []
     places: dict[tuple[object, ...], list[int]] = {}
     for record in records:
-        key = tuple(getattr(record, name) for name in TWIN)
+        key = tuple(getattr(record, name) for name in equal_to("twin"))
         twins = places.setdefault(key, [])
         for place in twins:
             if agree(found[place], record):
@@ -144,13 +145,7 @@ def _label(
     same = [(s, found) for s, found in rows if s.function == key.function]
     if len(same) > 1:
         known = [told(found) for _, found in same]
-        every = dict.fromkeys(name for other in known for name in other)
-        keys = [k for k in every if len({text(other.get(k)) for other in known}) > 1]
-        if ROBOT in keys:
-            keys = [ROBOT, *(k for k in keys if k != ROBOT and not _follows(k, ROBOT, known))]
-        named = [k for k in keys if k != SCENE]
-        if _kinds(named, known) == _kinds(keys, known):
-            keys = named
+        keys = _keys(known)
         if _kinds(keys, known) < len(same) and key.parameters:
             parts.append(f"[{key.parameters}]")
         mine = told(group)
@@ -159,12 +154,34 @@ def _label(
     return " ".join(parts)
 
 
+def _keys(known: Sequence[Mapping[str, object]]) -> list[str]:
+    """In what rows differ."""
+    every = dict.fromkeys(name for other in known for name in other)
+    keys = [k for k in every if len({text(other.get(k)) for other in known}) > 1]
+    if ROBOT in keys:
+        keys = [ROBOT, *(k for k in keys if k != ROBOT and not _follows(k, ROBOT, known))]
+    named = [k for k in keys if k != SCENE]
+    return named if _kinds(named, known) == _kinds(keys, known) else keys
+
+
+def labels(runs: Sequence[Sequence[Sequence[Record]]]) -> list[list[str]]:
+    """What tells the configurations of each run apart, in words that match between the runs, which
+    may be of other versions; what one of a run cannot know, which never started, tells nothing."""
+    every = [[told(group) for group in run] for run in runs]
+    keys = dict.fromkeys(
+        key
+        for known in every
+        for key in _keys(known)
+        if field_of(key) != "versions" and all(key in one for one in known)
+    )
+    return [[" ".join(_difference(k, one.get(k)) for k in keys) for one in run] for run in every]
+
+
 MOST = 3
 """Differences that a row's name lists."""
 
 ROBOT = "robot.name"
 """What tells robots apart; their scenes, sizes and files differ with it."""
-
 
 SCENE = "scene"
 """A digest: it tells nobody anything where a parameter tells as much."""
@@ -218,22 +235,42 @@ def by_test(
 
     A name is the test's id, without its file where that leaves all apart: it depends on where
     pytest ran. A test that repeats several tasks, or one with other parameters, has several: the
-    second is called `test_x[...] (stacking 2)`. `apart` splits the records of one test and task,
-    which come in the order in which they were made.
+    second of the first run is called `test_x[...] (stacking 2)`. `apart` splits the records of one
+    test and task, which come in the order in which they were made.
     """
     whole = any(len({r.test for r in run}) > len({r.name for r in run}) for run in runs)
-    sides: list[dict[tuple[str, str, int], list[Record]]] = []
-    for run in runs:
-        groups = grouped(run, lambda r: (r.test if whole else r.name, r.task))
-        sides.append(
-            {
-                (*key, number): group
-                for key, found in groups.items()
-                for number, group in enumerate(apart(found), start=1)
-            }
-        )
+    of_run = [grouped(run, lambda r: (r.test if whole else r.name, r.task)) for run in runs]
+    numbered = {
+        key: _numbered([apart(groups.get(key, [])) for groups in of_run])
+        for key in {*chain(*of_run)}
+    }
+    sides = [
+        {(*key, k): group for key in groups for k, group in numbered[key][place].items()}
+        for place, groups in enumerate(of_run)
+    ]
     every = {key for side in sides for key in side}
     return [{_name(key, every): group for key, group in side.items()} for side in sides]
+
+
+def _numbered(runs: Sequence[Sequence[list[Record]]]) -> list[dict[int, list[Record]]]:
+    """The configurations of each run by number: those with the same label have the same one in all
+    runs, then those with the same task parameters, then the rest by their order."""
+    known: list[tuple[str, str]] = []
+    sides = []
+    for run, names in zip(runs, labels(runs), strict=True):
+        side: dict[int, list[Record]] = {}
+        rest = {k: (name, task_parameters(run[k][0])) for k, name in enumerate(names)}
+        for first in range(3):  # the place in a key from which on two must be equal
+            for place, key in [*rest.items()]:
+                alike = (k for k, other in enumerate(known, 1) if other[first:] == key[first:])
+                if number := next((k for k in alike if k not in side), None):
+                    side[number] = run[place]
+                    del rest[place]
+        for place, key in rest.items():
+            known.append(key)
+            side[len(known)] = run[place]
+        sides.append(side)
+    return sides
 
 
 def _name(key: tuple[str, str, int], every: set[tuple[str, str, int]]) -> str:

@@ -48,6 +48,23 @@ def test_what_changed_with_which_release() -> None:
     assert len(told) == 2
 
 
+def test_each_task_of_a_test_has_a_history_of_its_own() -> None:
+    found = [
+        replace(r, settings={**r.settings, "task.levels": levels})
+        for levels, last in ((3, 0.6), (5, 1.0))
+        for version, placed in (("1", 1.0), ("2", 1.0), ("3", last), ("4", last))
+        for r in release(version, placed)
+    ]
+    for place in range(-8, 0):  # of the last release, which never starts
+        died = replace(found[place], settings={"task.levels": 5}, status="failed", versions={})
+        found[place] = replace(died, error=failed(0).error)
+    told = {h.variant: h.sentences()[-1][:21] for h in histories(found, {"stacking": METRICS})}
+    assert told == {
+        "headless tuned task.levels=3": "placed fell with 3: 9",
+        "headless tuned task.levels=5": "4: 8 of 8 repetitions",
+    }
+
+
 @pytest.mark.parametrize(("more", "tiny"), [(10, 0.0), (0, 1e-7)])
 def test_what_the_machine_or_rounding_makes_is_not_told(more: int, tiny: float) -> None:
     """A small change of a cost, and the last digits of a deterministic engine."""

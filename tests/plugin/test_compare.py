@@ -61,11 +61,12 @@ def test_a_worse_run_fails_with_one_sentence(
     monkeypatch.setenv("DURATION", "0.05")  # the cubes are still in the air
     result = run_pytest(
         pytester,
-        f"{ARGUMENTS} --sim-output=now --sim-compare-fail=landed:5%",
+        f"{ARGUMENTS} --sim-output=now --sim-compare-fail=landed:5% --sim-badge=badge.json",
         *form,
         ret=1,
         passed=1,
     )
+    assert json.loads((baseline / "badge.json").read_text())["color"] == "red"
     output = result.stdout.str()
     assert output.count(WORSE) == 1
     settings = output.index("settings.task.duration was 0.6, is 0.05")

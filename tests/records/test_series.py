@@ -113,6 +113,15 @@ def test_tests_are_matched_without_their_file_and_tasks_told_apart() -> None:
     assert list(by_test([mixed])[0]) == ["test_x[e] (stacking)", "test_x[e] (stacking 2)"]
 
 
+def test_tasks_of_a_test_are_matched_by_what_tells_them_apart_and_the_rest_by_order() -> None:
+    one, two, three = ([record(1, settings={"task.levels": levels})] for levels in (1, 2, 3))
+    before, after = by_test([one + two, three + two + one])
+    assert list(before.values()) == [one, two]
+    assert {name: after[name] for name in before} == before
+    before, after = by_test([two + one, three + two])
+    assert [(before[name], after[name]) for name in before] == [(two, two), (one, three)]
+
+
 def test_a_label_lists_three_differences() -> None:
     """And says when there are more."""
     ours = record(1, settings={"a": 1, "b": 1, "c": 1, "d": 1})

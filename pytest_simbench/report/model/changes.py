@@ -52,7 +52,7 @@ def _limited(change: Change) -> str:
     limit = change.limit.describe(change.metric, change.limit.amount)
     if change.exceeded:
         return f"FAILED, limit {limit}"
-    if change.loss > change.limit.amount:
+    if change.beyond:
         return f"may be chance, limit {limit}"
     return f"passed, limit {limit}"
 
