@@ -19,7 +19,8 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.versions import VersionedName
-from pytest_simbench.records.record import Record, Status
+from pytest_simbench.records.configuration import text
+from pytest_simbench.records.record import Record, Status, plain
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import MotionLimits, Pose, Robot
 from pytest_simbench.simulator.registry import adapter, address, settings_of
@@ -154,6 +155,6 @@ def file_stem_of(record: Record) -> str:
 
 
 def _stem(test: str, task: str, of_task: Mapping[str, Any], number: int, attempt: int) -> str:
-    told = json.dumps(of_task, sort_keys=True, default=list)
+    told = text(plain(of_task))
     name = file_name(short(test), test, task, told)
     return f"{name}-{number}" if attempt == 1 else f"{name}-{number}-attempt-{attempt}"
