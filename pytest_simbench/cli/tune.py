@@ -138,10 +138,12 @@ def _search(
     (name,), (label,) = chosen.simulators, chosen.profiles
     case = chosen.case(Variant(name, "headless", label), test="tune", folder=Path())
     of_test, note = None, ""
+    source: tuple[bytes, ...] = ()
     if "::" in target:
         found = asked(target, options)
         case = replace(found.experiment.case, trace="off", video="off")
         of_test, note = (found.experiment.asked, found.claims), found.failed
+        source = (Path(target.partition("::")[0]).read_bytes(),)
     can = adapter(name).info.capabilities
     wanted = target_of(target, cost or "cpu_cost", error, seeds, SEEDS, can, of_test)
     base = chosen.settings(name, label, case.changes)
@@ -149,7 +151,7 @@ def _search(
     seed = 1 if seed is None else seed
     claims = [f"{metric.name} {claim}" for metric, claim in wanted.claims]
     parts = (name, target, label, wanted.cost, error, seeds, seed, *map(str, space), *claims)
-    path = output or Path(RUNS) / folder_name(parts)
+    path = output or Path(RUNS) / folder_name((*parts, *source))
     with runs_in(path, executor) as runs:
         looks = Trials(wanted, replace(case, folder=path), runs)
         search = Search(looks, base, space, seed, progress(looks))

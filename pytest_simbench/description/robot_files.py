@@ -15,15 +15,18 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from copy import deepcopy
-from functools import cache, lru_cache
+from functools import cache, lru_cache, wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from pytest_simbench.description.mesh_check import LARGEST_MESH
 from pytest_simbench.description.urdf_check import LARGEST_FILE, Description
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.ground.files import FileError, read_file
 from pytest_simbench.scene import Robot
+
+P = ParamSpec("P")
+T = TypeVar("T")
 
 CONTENT = "content"
 """Key under which a robot's wire form carries its description."""
@@ -35,6 +38,20 @@ def last_change(robot: Robot) -> tuple[int, ...]:
     with suppress(DescriptionError):  # whoever reads it tells
         found += _written(*_meshes(robot, found))
     return found
+
+
+def robot_cache(function: Callable[Concatenate[Robot, P], T]) -> Callable[Concatenate[Robot, P], T]:
+    """A function of a robot that is carried out once, until a file of the robot changes."""
+
+    @lru_cache(maxsize=64)
+    def found(_: object, robot: Robot, /, *others: P.args, **named: P.kwargs) -> T:
+        return function(robot, *others, **named)
+
+    @wraps(function)
+    def asked(robot: Robot, /, *others: P.args, **named: P.kwargs) -> T:
+        return found(last_change(robot), robot, *others, **named)  # type: ignore[arg-type]
+
+    return asked
 
 
 def _written(*paths: str) -> tuple[int, ...]:
@@ -80,12 +97,11 @@ def content_of(robot: Robot) -> dict[str, Any]:
     Raises:
         DescriptionError: a file is missing or wrong; says which.
     """
-    return dict(_content_of(robot, last_change(robot)))
+    return dict(_content_of(robot))
 
 
-@lru_cache(maxsize=16)
-def _content_of(robot: Robot, changed: tuple[int, ...]) -> dict[str, Any]:
-    """The same, read once: each repetition asks for it."""
+@robot_cache
+def _content_of(robot: Robot) -> dict[str, Any]:
     return content(Description(robot.urdf, robot.packages), robot.name)
 
 

@@ -8,19 +8,19 @@ import platform
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
-from functools import cache, lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from pytest_simbench import __version__
 from pytest_simbench.client.environments import outside
-from pytest_simbench.description.robot_files import CONTENT, last_change, with_content
+from pytest_simbench.description.robot_files import CONTENT, robot_cache, with_content
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.versions import VersionedName
-from pytest_simbench.records.record import Record, Status
+from pytest_simbench.records.configuration import text
+from pytest_simbench.records.record import Record, Status, plain
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import MotionLimits, Pose, Robot
 from pytest_simbench.simulator.registry import adapter, address, settings_of
@@ -102,15 +102,13 @@ def describe_robot(robot: Robot | None) -> dict[str, str]:
     """Name of a robot and twelve digits of everything that it is; empty for a task's own robot."""
     if robot is None:
         return {}
-    changed = last_change(robot)
-    return dict(_describe_robot(robot, changed, robot.limits, robot.swing, robot.stand))
+    return dict(_describe_robot(robot, robot.limits, robot.swing, robot.stand))
 
 
-@lru_cache(maxsize=16)
+@robot_cache
 def _describe_robot(
-    robot: Robot, changed: tuple[int, ...], limits: MotionLimits | None, swing: object,
-    stand: Pose | None,
-) -> dict[str, str]:  # fmt: skip
+    robot: Robot, limits: MotionLimits | None, swing: object, stand: Pose | None
+) -> dict[str, str]:
     """The same; what is no part of a robot's equality is an argument."""
     wire = with_content({"robot": robot.to_wire()}, robot)["robot"]
     meshes = sorted(wire[CONTENT].pop("meshes"))  # named by their content
@@ -126,14 +124,6 @@ def scene_digest(task: Task) -> str:
     A robot's files count with their content, not their place.
     """
     try:
-        return _scene_digest(task)
-    except TypeError:  # a task with a list among its parameters
-        return _scene_digest.__wrapped__(task)
-
-
-@lru_cache(maxsize=16)
-def _scene_digest(task: Task) -> str:
-    try:
         wire = task.scene(0, Jitter(0.0, 0.0)).to_wire()
         robot = wire.get("robot")
         if robot:
@@ -145,7 +135,6 @@ def _scene_digest(task: Task) -> str:
     return hashlib.sha256(data.encode()).hexdigest()[:12]
 
 
-@cache
 def _content(path: str) -> str:
     try:
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()
@@ -166,6 +155,6 @@ def file_stem_of(record: Record) -> str:
 
 
 def _stem(test: str, task: str, of_task: Mapping[str, Any], number: int, attempt: int) -> str:
-    told = json.dumps(of_task, sort_keys=True, default=list)
+    told = text(plain(of_task))
     name = file_name(short(test), test, task, told)
     return f"{name}-{number}" if attempt == 1 else f"{name}-{number}-attempt-{attempt}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
 
 import coal
 import numpy as np
@@ -12,7 +11,7 @@ import pinocchio as pin
 from scipy.spatial import ConvexHull
 
 from pytest_simbench.description.links import link_poses
-from pytest_simbench.description.robot_files import description_xml, last_change
+from pytest_simbench.description.robot_files import description_xml, robot_cache
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.motion.hulls import outward_faces
 from pytest_simbench.motion.model import RobotModel
@@ -51,7 +50,7 @@ class PlanningScene:
         self.opening = model.robot.gripper.opened
         self.held: str | None = None
         self._active_for: tuple[str | None, tuple[str, ...]] | None = None
-        geometry = _links(model.robot, last_change(model.robot)).copy()
+        geometry = _links(model.robot).copy()
         self._links = list(range(len(geometry.geometryObjects)))
         inverse = model.base.inverse()
         self._free = {body.name: body for body in scene.free_bodies}
@@ -107,7 +106,7 @@ class PlanningScene:
         self._prepared: PreparedRobot | None = None
         if not self.model.robot.beside:
             return
-        self._prepared = prepared = _prepared(self.model.robot, last_change(self.model.robot))
+        self._prepared = prepared = _prepared(self.model.robot)
         for index in self._links:
             shape = geometry.geometryObjects[index]
             frame = self.model.pin.frames[shape.parentFrame]
@@ -236,16 +235,15 @@ class PlanningScene:
         return None
 
 
-@lru_cache(maxsize=64)
-def _prepared(robot: Robot, changed: tuple[int, ...]) -> PreparedRobot:
-    """The reduced robot, read once: each repetition asks for it."""
+@robot_cache
+def _prepared(robot: Robot) -> PreparedRobot:
+    """The reduced robot."""
     return PreparedRobot(robot)
 
 
-@lru_cache(maxsize=64)
-def _links(robot: Robot, changed: tuple[int, ...]) -> pin.GeometryModel:
-    """The shapes of a robot's links and the pairs to check, made once: each repetition asks for it.
-    Its files are sound."""
+@robot_cache
+def _links(robot: Robot) -> pin.GeometryModel:
+    """The shapes of a robot's links and the pairs to check. Its files are sound."""
     model = RobotModel(robot).pin
     urdf = ET.tostring(description_xml(robot), encoding="unicode")
     geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, package_dirs=[])

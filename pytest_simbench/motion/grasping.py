@@ -11,12 +11,11 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-from pytest_simbench.description.robot_files import content_of
+from pytest_simbench.description.robot_files import content_of, robot_cache
 from pytest_simbench.motion.adapting import with_tool
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError, Unreachable
@@ -81,7 +80,7 @@ def grasping(robot: Robot, width: float, scale: float, wide: bool = False) -> Ro
     )
 
 
-@cache
+@robot_cache
 def _adapted(robot: Robot, width: float) -> str:
     """The path of the description with the new tool centre point."""
     return with_tool(robot, Pose.at(0.0, width / 2, 0.0), GRASP_LINK, GRASP_JOINT).urdf
@@ -94,7 +93,7 @@ def width_of_jaw(robot: Robot) -> float:
     return 2 * float(origin.get("xyz", "").split()[1])
 
 
-@cache
+@robot_cache
 def _opening(robot: Robot, gap: float, above: float) -> float | None:
     """Position of the jaw at which it stands so far from y = 0 of the tool frame [rad]; None where
     it cannot."""

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
+from pytest_simbench.description.robot_files import robot_cache
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.grasping import CLEARANCE, GRASP_LINK, width_of_jaw
@@ -56,7 +56,7 @@ class Hand:
     tips: float
 
 
-@lru_cache(maxsize=16)
+@robot_cache
 def hand_of(robot: Robot, scale: float) -> Hand:
     """Raises `Ungraspable` where there is no hand that grasps."""
     model, gripper = RobotModel(robot), robot.gripper

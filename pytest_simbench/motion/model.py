@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from functools import cache, lru_cache
 
 import numpy as np
 import pinocchio as pin
 
 from pytest_simbench.description.links import check_robot
-from pytest_simbench.description.robot_files import last_change
+from pytest_simbench.description.robot_files import robot_cache
 from pytest_simbench.scene import Body, Box, FloatArray, MotionLimits, Pose, Robot
 from pytest_simbench.simulator import DescriptionError
 
@@ -28,7 +27,7 @@ class RobotModel:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self.pin = _checked(robot, last_change(robot)).copy()  # gravity and armature are set in it
+        self.pin = _checked(robot).copy()  # gravity and armature are set in it
         self.pin.gravity.linear = np.zeros(3)
         self.data = self.pin.createData()
         self.arm = len(robot.arm_joints)
@@ -187,7 +186,7 @@ hand that points down reaches no farther. The xArm 7, the smallest one that was 
 study's layout, has 0.82."""
 
 
-@cache
+@robot_cache
 def scale_of(robot: Robot) -> float:
     """All lengths of a robot's scene over those of the study's layout: in tenths, at most 1.
 
@@ -198,7 +197,7 @@ def scale_of(robot: Robot) -> float:
     return _tenths(RobotModel(robot).reach / FULL_REACH)
 
 
-@cache
+@robot_cache
 def grasping_scale_of(robot: Robot) -> float:
     """The same for a scene in which cubes are grasped from above."""
     return _tenths(RobotModel(robot).wrist_reach / FULL_WRIST_REACH)
@@ -208,10 +207,10 @@ def _tenths(share: float) -> float:
     return min(10, max(1, math.floor(10.0 * share))) / 10.0
 
 
-@lru_cache(maxsize=64)
-def _checked(robot: Robot, changed: tuple[int, ...]) -> pin.Model:
-    """Pinocchio's model of a robot whose files are sound, read once: each repetition asks for it.
-    Raises `DescriptionError` for a URDF that cannot be read."""
+@robot_cache
+def _checked(robot: Robot) -> pin.Model:
+    """Pinocchio's model of a robot whose files are sound. Raises `DescriptionError` for a URDF that
+    cannot be read."""
     check_robot(robot)
     try:
         model = pin.buildModelFromUrdf(robot.urdf, mimic=False)

@@ -14,6 +14,7 @@ from pytest_simbench.cli.values import Auto
 from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.identity import scene_digest
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.resumed import NotResumed
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
@@ -28,9 +29,10 @@ from pytest_simbench.plugin.marks import number_mark
 from pytest_simbench.plugin.run import Run
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.claims import Claim
+from pytest_simbench.records.configuration import text
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.record import Record, RecordError
+from pytest_simbench.records.record import Record, RecordError, plain
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks.base import Task
 
@@ -47,25 +49,27 @@ class RepeatFixture:
         self.node = node
         self.case = case
         self.run = run
-        self.tasks: list[Task] = []
+        self.known: list[tuple[str, ...]] = []
         self.results: list[ResultSet] = []
         self.described: dict[str, TaskDescription] = {}
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say.
 
-        A task that was repeated before fails the test: the repetitions could not be told apart.
-        The same task with other parameters is another one.
+        One of which records say the same as of an earlier one fails the test: the repetitions could
+        not be told apart. The same task with other parameters is another one.
         """
-        if checked_task(task, "repeat") in self.tasks:
-            refuse(
-                f"repeat() is called for the task {task.name!r} a second time in one test, and its "
-                "repetitions could not be told apart: write a second test, or parametrize this one"
-            )
-        self.tasks.append(task)
         wanted = options.value(self.node.config, "sim_reps")
         skips = session_of(self.node.config).selection.every_robot
-        experiment = can_do(Experiment(self.case, task), skips)
+        experiment = can_do(Experiment(self.case, checked_task(task, "repeat")), skips)
+        known = (task.name, text(plain(task.parameters())), scene_digest(task))
+        if known in self.known:
+            refuse(
+                f"repeat() is called for the task {task.name!r} a second time in one test with the "
+                "same parameters, and its repetitions could not be told apart: write a second "
+                "test, parametrize this one, or give the other task a `name` of its own"
+            )
+        self.known.append(known)
         experiment = experiment.in_case(attempt=self.run.begin(experiment))
         with failing(REFUSALS):
             found = self.run.take(experiment, wanted if isinstance(wanted, int) else None)

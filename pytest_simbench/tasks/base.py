@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.notes import Wait
 from pytest_simbench.records.readings import Reading
 from pytest_simbench.scene import Box, Pose, Robot, Scene, Vector3
+from pytest_simbench.tasks.identity import told
 
 CUBE_SIZE = 0.05
 """Edge of every cube [m] (the study)."""
@@ -154,10 +155,10 @@ class Task(ABC):
     def parameters(self) -> dict[str, Any]:
         """Every parameter under its name in records: `task.levels`, `task.speeds.carry`. The robot
         is a part of the record by itself."""
-        told = asdict(self)  # type: ignore[call-overload]
-        told.pop(ROBOT, None)
+        names = [item.name for item in fields(self) if item.name != ROBOT]  # type: ignore[arg-type]
+        values = {name: told(getattr(self, name)) for name in names}
         scaled = {} if self.scale == 1.0 else {"task.scale": self.scale}
-        return {**dict(_flat("task", told)), **scaled}
+        return {**dict(_flat("task", values)), **scaled}
 
     @abstractmethod
     def scene(self, seed: int, jitter: Jitter) -> Scene:

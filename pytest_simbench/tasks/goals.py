@@ -5,17 +5,13 @@ Lengths are those of an arm of full reach; a smaller one has a smaller scene, as
 
 from __future__ import annotations
 
-import hashlib
-import inspect
-import re
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from copy import copy, deepcopy
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, lru_cache, partial
-from threading import Lock
+from functools import cached_property, lru_cache
 from types import MethodType
 from typing import Any, ClassVar
 
@@ -26,10 +22,10 @@ from pytest_simbench.motion.model import grasping_scale_of, scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Robot, Scene
-from pytest_simbench.scene.policy import Function, Observation, checked, name_of
+from pytest_simbench.scene.policy import Observation, checked, name_of
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Randomness, Task, cube
+from pytest_simbench.tasks.identity import digest, told
 from pytest_simbench.tasks.pushing import BLOCK_MASS, BLOCK_SIZE, FRICTION, RED
-from pytest_simbench.worker.wire import pack
 
 HELD = 0.5
 """What is at its goal for so long [s] has come to stay."""
@@ -103,7 +99,7 @@ class GoalTask(Task):
         """The policy by its name, and by a digest of its source and of what it holds."""
         names = [item.name for item in fields(self) if item.name not in ("policy", "robot")]
         return {
-            **{f"task.{name}": getattr(self, name) for name in names},
+            **{f"task.{name}": told(getattr(self, name)) for name in names},
             "task.policy": name_of(self.policy),
             "task.policy_digest": digest(self.policy),
         }
@@ -275,27 +271,3 @@ def _copied(policy: Any) -> Any:
             with suppress(Exception):
                 held[name] = deepcopy(value, known)
     return own
-
-
-_PARSING = Lock()
-"""To find a class in its file means to parse it, which fails in two threads at once (CPython issue
-106905): one of 1400 pushes side by side ended so."""
-
-
-def digest(policy: Any) -> str:
-    """Of a policy's source and of the numbers and texts that it holds; others (the weights of a
-    network, for instance) do not count."""
-    text, held = [name_of(policy)], {**getattr(policy, "__dict__", {})}
-    made = policy._act if isinstance(policy, Function) else policy
-    while isinstance(made, partial):
-        held |= {f"argument {k}": value for k, value in enumerate(made.args)} | made.keywords
-        made = made.func
-    held |= getattr(getattr(made, "__self__", made), "__dict__", {})  # of a method, an object
-    with suppress(TypeError):
-        held |= inspect.getclosurevars(made).nonlocals
-    with suppress(OSError, TypeError), _PARSING:
-        text.append(inspect.getsource(made if inspect.isroutine(made) else type(made)))
-    for name, value in sorted(held.items()):
-        if isinstance(value, int | float | str | list | tuple | dict | np.ndarray | np.generic):
-            text.append(re.sub(" at 0x[0-9a-f]+", "", f"{name}={pack(value)!r}"))
-    return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]

@@ -18,12 +18,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
 
 from pytest_simbench.client.world import World
+from pytest_simbench.description.robot_files import robot_cache
 from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.grips import grips, hand_of
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over
@@ -264,7 +264,7 @@ class Oversized(Inserting):
         return (replace(inserted, better="lower"), *others)
 
 
-@lru_cache(maxsize=16)
+@robot_cache
 def softened(robot: Robot, stiffness: float) -> Robot:
     """The same robot, all drives of its arm softer by one factor, so that the tool, pointing down
     on the hole, is held level with a stiffness [N/m], the mean of both directions.

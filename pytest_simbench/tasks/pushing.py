@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.world import World
+from pytest_simbench.description.robot_files import robot_cache
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError, Unreachable
 from pytest_simbench.motion.kinematics import inverse_kinematics, tool_over, tool_path
@@ -246,7 +247,7 @@ class CurvePushing(Pushing):
     turn: float = 0.785
 
 
-@cache
+@robot_cache
 def _front(robot: Robot) -> tuple[float, float]:
     """Of the closed hand where it can touch the block."""
     planning = PlanningScene(RobotModel(robot), Scene("front", (), robot))

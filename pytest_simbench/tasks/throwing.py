@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.world import World
+from pytest_simbench.description.robot_files import robot_cache
 from pytest_simbench.motion.errors import PlanningError, RobotError
 from pytest_simbench.motion.grasping import grasping
 from pytest_simbench.motion.model import RobotModel, grasping_scale_of
@@ -263,7 +264,7 @@ class Throwing(Task):
         return thrown
 
 
-@cache
+@robot_cache
 def perfect_throw(
     robot: Robot, release_fraction: float, feasible: bool, scale: float = 1.0
 ) -> Throw:

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.cli.main import main
+from pytest_simbench.cli.runs import RUNS
 from pytest_simbench.cli.tune import _judge
 from pytest_simbench.cli.tune_told import (
     Result,
@@ -146,6 +147,19 @@ def test_a_test_on_several_simulators(
     assert {(r["function"], r["task"]) for r in made} == {("tune_test_falls", "falling")}
     assert all(r["contended"] for r in made)
     assert (Path("out/mujoco/records.jsonl").exists(), Path("out/pybullet").exists()) == (1, 0)
+
+
+def test_a_test_that_was_edited_is_searched_for_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    words = ("tune", "test_edited.py::test_falls", "--sim", "mujoco", "--settings", "timestep")
+    for text in (TEST, TEST, f"{TEST}# edited"):
+        Path("test_edited.py").write_text(text)
+        assert main([*words, "--trials", "1", "--seeds", "1", "--budget", "5s"]) == 0
+    assert len([*Path(RUNS).iterdir()]) == 2
 
 
 def test_killed_and_gone_on_with(tmp_path: Path) -> None:

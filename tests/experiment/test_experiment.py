@@ -11,13 +11,15 @@ import pytest
 
 from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.identity import describe_robot, expected
+from pytest_simbench.experiment.identity import describe_robot, expected, scene_digest
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.repetition import Hooks, Repetition, group
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.laws.free import FreeFall
+from pytest_simbench.motion.model import scale_of
 from pytest_simbench.motion.registry import find
 from pytest_simbench.records.record import Record
+from pytest_simbench.tasks import Reaching
 from pytest_simbench.tasks.base import Task
 from tests.description.test_urdf_check import stl
 from tests.made_up import MadeUp
@@ -36,10 +38,14 @@ class Halved(Falling):
 def test_a_robot_whose_file_was_changed_is_another_one(tmp_path: Path) -> None:
     file = small_arm(tmp_path)
     before, urdf = find(str(file)), file.with_suffix(".urdf")
-    first = describe_robot(before)
+    task = Reaching(None, robot=before)
+    first, scene, scale = describe_robot(before), scene_digest(task), scale_of(before)
     urdf.write_text(urdf.read_text().replace('<mass value="1"', '<mass value="1.5"', 1))
     os.utime(urdf, ns=(0, 1))
     assert describe_robot(find(str(file))) == describe_robot(before) != first
+    assert scene_digest(task) != scene
+    urdf.write_text(urdf.read_text().replace('xyz="0 0 0.3"', 'xyz="0 0 0.1"', 1))
+    assert scale_of(before) < scale
     box, mesh = '<box size="0.02 0.01 0.08"/>', tmp_path / "hand.stl"
     urdf.write_text(urdf.read_text().replace(box, '<mesh filename="hand.stl"/>', 1))
     mesh.write_bytes(stl(0.1))

@@ -83,9 +83,12 @@ def test_one_task_twice_in_a_test_and_good_settings(pytester: pytest.Pytester) -
         + """
 import numpy as np
 
+class Faster(Falling):
+    '''Another one of the same name and parameters.'''
+
 def test_twice(repeat):
     repeat(Falling(duration=0.1))
-    repeat(Falling(duration=0.1))
+    repeat(Faster(duration=0.1))
 
 def test_two_tasks(repeat):
     repeat(Falling())

@@ -6,6 +6,7 @@ import hashlib
 import json
 from dataclasses import dataclass, field
 from itertools import combinations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -124,8 +125,28 @@ def test_parameters_are_flat_and_name_every_rule() -> None:
     assert Nested().parameters() == {
         "task.duration": 0.6, "task.inner.low": 1.0, "task.inner.high": 2.0
     }  # fmt: skip
-    assert LeaningTowers().parameters()["task.margins"] == (0.008, 0.010, 0.012)
+    assert LeaningTowers().parameters()["task.margins"] == [0.008, 0.010, 0.012]
     assert Stacking().study().parameters()["task.speeds.contact"] == 1.0
+
+
+def test_whatever_a_task_holds_is_told_as_records_hold_it() -> None:
+    class Hold:
+        at = None
+
+    @dataclass(frozen=True)
+    class Own(Falling):
+        what: Any = None
+
+    def told(what: Any) -> str:
+        return json.dumps(Own(what=what).parameters()["task.what"])
+
+    for what, text in (np.int64(2), "2"), (Path("a"), '"a"'), (np.ones(1), "[1.0]"), ({2}, '["2"]'):
+        assert told(what) == text
+    policy = Hold()
+    before = told(policy)
+    policy.at = [1.0]  # it acts
+    assert before == told(policy) == told([Hold()])[1:-1] != told(len)
+    assert "0x" not in before + told(len) + told(lambda: 0)
 
 
 def test_a_task_of_one_version_is_its_own_smoke_and_study() -> None:

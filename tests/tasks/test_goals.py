@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
@@ -20,7 +21,7 @@ from pytest_simbench.scene import Pose
 from pytest_simbench.scene.policy import Command, Observation, as_policy
 from pytest_simbench.tasks import GoalTask, Jitter, PickAndPlace, PushingToGoal, Reaching
 from pytest_simbench.tasks.base import Outcome
-from pytest_simbench.tasks.goals import digest
+from pytest_simbench.tasks.identity import digest
 from tests.conftest import performed
 from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, put
 
@@ -125,6 +126,24 @@ def test_a_record_tells_which_policy_it_was() -> None:
         lambda gain: as_policy(Held(gain).act),
     ):
         assert digest(bound(1.0)) == digest(bound(1.0)) != digest(bound(2.0))
+
+    def circle(gain: float) -> Held:
+        inner = Held(gain)
+        inner.around = [{"held": Held(inner)}]  # type: ignore[attr-defined]
+        return inner
+
+    for held in (
+        Held, closed, circle,
+        lambda gain: partial(open_loop, Held(gain)),
+        lambda gain: lambda seen, gain=gain: gain,
+        lambda gain: Fraction(gain),
+        lambda gain: [{frozenset({gain})}, np.array([Held(gain)])],
+    ):  # fmt: skip
+        assert digest(Held(held(1.0))) == digest(Held(held(1.0))) != digest(Held(held(2.0)))
+    filtered = Held(Held(1.0))
+    before = digest(filtered)
+    filtered.gain.gain = 2.0  # by acting
+    assert digest(filtered) == before
 
 
 def test_what_a_policy_is_given_and_what_is_scored(monkeypatch: pytest.MonkeyPatch) -> None:

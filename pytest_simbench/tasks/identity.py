@@ -1,0 +1,131 @@
+"""What records say of a value that a task holds; an object is told by a digest, the same in each
+process.
+
+Objects change while they act (a filter, a counter). So one that is held counts as it was when this
+process saw it first, and a policy's own numbers, texts, lists and arrays as they are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import re
+import weakref
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from functools import lru_cache, partial
+from logging import Logger
+from pathlib import PurePath
+from threading import Lock
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from pytest_simbench.records.record import plain
+from pytest_simbench.scene.policy import Function, name_of
+from pytest_simbench.worker.wire import pack
+
+DEPTH = 10
+"""Objects in objects that are looked into."""
+
+NAMED = ModuleType | type | Logger
+"""What is told by its name alone."""
+
+_PARSING = Lock()
+"""To find a class in its file means to parse it, which fails in two threads at once (CPython issue
+106905): one of 1400 pushes side by side ended so."""
+
+_first: dict[int, tuple[weakref.ref[Any], str]] = {}
+"""Digests of objects, by identity."""
+
+Known = dict[int, tuple[Any, str]]
+"""Objects of one digest, by identity, and their own digests; empty while they are looked into."""
+
+
+def told(value: Any) -> Any:
+    """A value as records hold it; an object by its name and digest."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = {item.name: getattr(value, item.name) for item in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: told(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [told(item) for item in value]
+    if isinstance(value, set | frozenset):
+        return sorted(str(told(item)) for item in value)
+    if isinstance(value, str | int | float | None):
+        return value
+    if isinstance(value, PurePath | np.generic):
+        return plain(value)
+    return f"{name_of(value)} {_at_first(value)}"
+
+
+def digest(policy: Any, known: Known | None = None, depth: int = DEPTH) -> str:
+    """Of a policy's source and of what it holds."""
+    text, held = [name_of(policy)], _attributes(policy)
+    made = held.pop("_act") if isinstance(policy, Function) else policy
+    while isinstance(made, partial):
+        held |= {f"argument {k}": value for k, value in enumerate(made.args)} | made.keywords
+        made = made.func
+    held |= _attributes(getattr(made, "__self__", made))  # of a method, an object
+    with suppress(TypeError, ValueError):
+        held |= inspect.getclosurevars(made).nonlocals
+        held |= {"defaults": made.__defaults__, "keywords": made.__kwdefaults__}
+    written: Any = inspect.unwrap(made) if inspect.isroutine(made) else type(made)
+    with suppress(OSError, TypeError):
+        text.append(_source(getattr(written, "__code__", written)))
+    if not hasattr(made, "__dict__"):  # a date, say
+        text.append(re.sub("( at)? 0x[0-9a-fA-F]+", "", repr(made)))
+    for name, value in sorted(held.items()):
+        if value is not None:
+            text.append(f"{name}={_packed(value, known, depth)!r}")
+    return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]
+
+
+def _at_first(value: Any) -> str:
+    """The digest of an object as it was when it was seen first."""
+    seen, found = _first.get(id(value), (None, ""))
+    if seen is None or seen() is not value:
+        found = digest(value, {id(value): (value, "")})
+        with suppress(TypeError):  # there are objects without weak references
+            _first[id(value)] = weakref.ref(value), found
+    return found
+
+
+def _attributes(value: Any) -> dict[str, Any]:
+    state = None if isinstance(value, NAMED) else object.__getstate__(value)
+    own, slots = state if isinstance(state, tuple) else (state, {})
+    return {**(own or {}), **slots}
+
+
+@lru_cache(maxsize=64)
+def _source(written: Any) -> str:
+    with _PARSING:
+        return inspect.getsource(written)
+
+
+def _packed(value: Any, known: Known | None, depth: int) -> Any:
+    """Plain data; objects by their digests."""
+    if isinstance(value, NAMED):
+        return name_of(value)
+    if isinstance(value, dict):
+        pairs = [[_packed(part, known, depth) for part in pair] for pair in value.items()]
+        return {key if isinstance(key, str | int) else repr(key): item for key, item in pairs}
+    if isinstance(value, list | tuple):
+        return [_packed(item, known, depth) for item in value]
+    if isinstance(value, set | frozenset):
+        return sorted(repr(_packed(item, known, depth)) for item in value)
+    array = isinstance(value, np.ndarray | np.generic) and not value.dtype.hasobject
+    if array or isinstance(value, str | bytes | int | float | complex | None):
+        return pack(value)
+    if hasattr(type(value), "tolist"):  # the weights of a network
+        return _packed(value.tolist(), known, depth)
+    if known is None:
+        return _at_first(value)
+    if id(value) not in known:
+        known[id(value)] = value, ""  # a circle ends here
+        known[id(value)] = value, digest(value, known, depth - 1) if depth else ""
+    return known[id(value)][1]
