@@ -205,7 +205,8 @@ class Run:
         return self._attempts[key]
 
     def take(self, experiment: Experiment, wanted: int | None) -> dict[int, Record]:
-        """By repetition what the run that is completed has recorded; of this run from now on.
+        """By repetition what the run that is completed has recorded; of this run from now on, while
+        what it said of the test's claims counts no more.
 
         Raises:
             NotResumed: it was of another configuration.
@@ -214,6 +215,8 @@ class Run:
             return {}
         found = self.resumed.take(experiment, wanted)
         self.folder.take_over(found.values())
+        for claim in self.resumed.claims.pop(experiment.case.test, ()):
+            self.folder.claim(replace(claim, verdict=""))
         return found
 
     def describe(self, task: Task) -> None:

@@ -136,7 +136,8 @@ def _that_count(found: Sequence[Claim], crashed: Collection[str]) -> list[Claim]
     """The last of each; of a test as a whole, only that it failed and no claim of it says why. What
     failed counts no more where the resumed test passed as a whole, nor what an earlier attempt of
     a test said of crashes where its last one has none."""
-    every = {claim.identity: claim for claim in found}.values()
+    last_of = {claim.identity: claim for claim in found}
+    every = [claim for claim in last_of.values() if claim.verdict]
     passed = {claim.test for claim in every if not claim.metric and claim.verdict == "PASS"}
     last = [
         claim
