@@ -145,6 +145,7 @@ def claim_of(case: Case, result: ResultSet, metric: Metric, judgement: Judgement
         high=bounds.high,
         n=bounds.n,
         crashed=len(result.crashed),
+        without=result.without(metric),
         advice=judgement.advice,
     )
 
