@@ -128,7 +128,7 @@ TASK = "task."
 
 
 def _values(record: Record, use: Use) -> dict[str, Any]:
-    untold = ("",) if record.ok else ("", [])
+    untold: tuple[Any, ...] = ("",) if record.ok else ("", [])
     return {
         key: value
         for name in equal_to(use)
