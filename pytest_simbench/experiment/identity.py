@@ -8,6 +8,7 @@ import platform
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict
+from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -124,15 +125,23 @@ def scene_digest(task: Task) -> str:
     A robot's files count with their content, not their place.
     """
     try:
-        wire = task.scene(0, Jitter(0.0, 0.0)).to_wire()
-        robot = wire.get("robot")
-        if robot:
+        try:
+            wire = _wire(task)
+        except TypeError:  # a task with a list among its parameters
+            wire = _wire.__wrapped__(task)
+        if robot := wire.get("robot"):
             kept = {key: value for key, value in robot.items() if key != "packages"}
-            wire["robot"] = {**kept, **{k: _content(robot[k]) for k in ("urdf", "srdf")}}
+            told = {**kept, **{k: _content(robot[k]) for k in ("urdf", "srdf")}}
+            wire = {**wire, "robot": told}
         data = json.dumps(wire, sort_keys=True, default=str)
     except Exception:  # a task may refuse this seed; then nothing is known
         return ""
     return hashlib.sha256(data.encode()).hexdigest()[:12]
+
+
+@lru_cache(maxsize=16)
+def _wire(task: Task) -> dict[str, Any]:
+    return task.scene(0, Jitter(0.0, 0.0)).to_wire()
 
 
 def _content(path: str) -> str:

@@ -18,7 +18,7 @@ from pytest_simbench.records.configuration import (
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RECORDS, RunFolder
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import configurations, short
+from pytest_simbench.records.series import configurations, grouped, short
 
 
 def run_to_resume(folder: Path | None, runs: Path) -> Path:
@@ -51,6 +51,7 @@ class Resumed:
     Attributes:
         records: all of them, interrupted ones too.
         tasks: what their metrics mean, by the name of their task.
+        claims: the last ones of tests that have not run again, by test.
 
     Raises:
         RecordError: its records cannot be read.
@@ -61,6 +62,8 @@ class Resumed:
         reading = folder.read()
         self.records = reading.every
         self.tasks = reading.tasks
+        last = {claim.identity: claim for claim in reading.claims if claim.verdict}
+        self.claims = grouped(last.values(), lambda claim: claim.test)
         self._problems = reading.problems
         self._taken: set[int] = set()
         self._checked: set[str] = set()

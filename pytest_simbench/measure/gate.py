@@ -109,7 +109,7 @@ class GateReport:
     Attributes:
         differences: settings, versions and machines that are not the same: read them first.
         changes: every comparison that can fail the run: those of the limits, then of each test the
-            share of crashed repetitions.
+            share of crashed repetitions, and of those that finished without a value.
         others: metrics without a limit, tested in both directions and corrected among
             themselves: nothing fails for them, and they take nothing from the limits' certainty.
         broken: tests that gave no result any more and limits that cannot fail or compared nothing,
@@ -170,15 +170,16 @@ def run_gate(
         if limit.metric in after[test].known
     )
     share = 1 / (1 + beside)
-    crashed, left = _rises({test: (before[test], after[test]) for test in common}, limits, share)
+    crashes_may = next((limit for limit in limits if limit.metric == CRASHED.name), NO_MORE)
     limits = [limit for limit in limits if limit.metric != CRASHED.name]
     found = {
         limit: {test: _change(test, before[test], after[test], limit) for test in common}
         for limit in limits
     }
-    changes = _corrected(
-        (c for of_limit in found.values() for c in of_limit.values()), left * share
-    )
+    tested = [change for of_limit in found.values() for change in of_limit.values()]
+    sides = {test: (before[test], after[test]) for test in common}
+    lost, left = _rises(sides, crashes_may, tested, share)
+    changes = _corrected(tested, left * share)
     limited = {limit.metric for limit in limits}
     others = _corrected(
         _change(test, before[test], after[test], Limit(name, 0.0, True), both_ways=True)
@@ -194,8 +195,8 @@ def run_gate(
             (broken if typed else notes).append(f"{limit} compared nothing: {_told(reasons)}")
         else:
             apart = {test: untested for test, untested in reasons.items() if untested != UNKNOWN}
-            for test, (why, lost) in apart.items():
-                fails = typed and lost and after[test].ok
+            for test, (why, gone) in apart.items():
+                fails = typed and gone and after[test].ok
                 (broken if fails else notes).append(f"{test}: {limit} is not tested: {why}")
     number = max(1, sum(change.by_chance for change in changes))
     notes += [
@@ -207,7 +208,7 @@ def run_gate(
     named = differences({test: (before[test].records, after[test].records) for test in common})
     return GateReport(
         tuple(named),
-        (*changes, *crashed),
+        (*changes, *lost),
         others,
         tuple(filter(None, broken)),
         tuple(sorted(notes)),
@@ -286,26 +287,42 @@ def _broken(test: str, old: ResultSet, new: ResultSet) -> str:
 
 
 def _rises(
-    sides: Mapping[str, tuple[ResultSet, ResultSet]], limits: Iterable[Limit], share: float
+    sides: Mapping[str, tuple[ResultSet, ResultSet]],
+    crashes_may: Limit,
+    tested: Iterable[Change | Untested],
+    share: float,
 ) -> tuple[list[Change], float]:
-    """By test the change of the share of crashed repetitions, which without a limit of its own may
-    not rise; and the part of the error that is left for the limits."""
-    limit = next((limit for limit in limits if limit.metric == CRASHED.name), NO_MORE)
+    """By test the change of the share of crashed repetitions, then of those that finished without
+    a value of a metric that was compared, which may not rise; and the part of the error that is
+    left for the limits."""
+    counted = [
+        (test, CRASHED, crashes_may, old.by_seed(CRASHED), new.by_seed(CRASHED))
+        for test, (old, new) in sides.items()
+    ]
+    for change in (c for c in tested if isinstance(c, Change)):
+        both, name = sides[change.test], f"repetitions without {change.metric.name}"
+        if any(side.without(change.metric) for side in both):
+            lacking = Metric(name, name, better="lower", kind="yes_no")
+            first, second = (
+                {r.seed: float(side.value(r, change.metric) is None) for r in side.ok}
+                for side in both
+            )
+            counted.append((change.test, lacking, NO_MORE, first, second))
     found, chances = [], []
-    for test, (old, new) in sides.items():
-        first, second = old.by_seed(CRASHED), new.by_seed(CRASHED)
+    for test, metric, limit, first, second in counted:
         if first and second:
             comparison = compare_by_seed(first, second, "greater")
             chances.append(crashes.rise(first, second, comparison.paired))
-            loss = limit.loss(CRASHED, comparison.first, comparison.second)
-            found.append(Change(test, CRASHED, limit, comparison, 1.0, loss))
+            loss = limit.loss(metric, comparison.first, comparison.second)
+            found.append(Change(test, metric, limit, comparison, 1.0, loss))
     p_values, left = crashes.corrected(chances)
     shared = [min(1.0, p_value / share) for p_value in p_values]
     return [replace(c, p_value=p) for c, p in zip(found, shared, strict=True)], left
 
 
 NO_MORE = Limit(CRASHED.name, 0.0, True)
-"""What holds of crashes when nobody says anything: their share may not rise."""
+"""What holds of crashes when nobody says anything, and of values that are missing: their share may
+not rise."""
 
 PAIRS = math.ceil(math.log2(1 / ALPHA))
 """With fewer no change is significant, however large: 5."""

@@ -138,6 +138,10 @@ class ResultSet:
         """A metric's values, one for each repetition that has one, in their order."""
         return [found for record in self.records if (found := self.value(record, name)) is not None]
 
+    def without(self, name: str | Metric) -> int:
+        """How many repetitions finished and have no value of a metric."""
+        return sum(self.value(record, name) is None for record in self.ok)
+
     def by_seed(self, name: str | Metric) -> dict[int, float]:
         """A metric's values by seed, for pairing with another set."""
         found = ((record.seed, self.value(record, name)) for record in self.records)
@@ -286,6 +290,8 @@ class ResultSet:
         elif crashed:
             number += f" that finished, {crashed} crashed"
             number += ", not counted by --protocol paper" if metric.crashed is not None else ""
+        if without := self.without(metric):
+            number += f", {without} without a value"
         return (
             f"{self.label}: {metric.name} is {metric.format(found.mean)} on average "
             f"({self._bounds(metric, found)}, {number})"

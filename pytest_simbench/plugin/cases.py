@@ -40,7 +40,7 @@ def case_of(
         settings: that the test changes, unchecked.
     """
     from pytest_simbench.experiment.case import PROTOCOLS
-    from pytest_simbench.plugin.marks import named, number_mark
+    from pytest_simbench.plugin.marks import named, number
 
     name, mode = made_for.simulator, made_for.mode
     session = session_of(config)
@@ -52,7 +52,7 @@ def case_of(
     if item is not None:
         function, others = named(item, made_for.id_with(len(chosen.profiles)))
         of_test = {"test": item.nodeid, "function": function, "variant": others}
-        timeout = timeout if timeout is not None else number_mark(item, "sim_timeout")
+        timeout = number(item, "sim_timeout")
         of_test |= {"needs": _needs(item)}
         own = arguments.checked_settings(settings, made_for, chosen)
     return chosen.case(
@@ -121,7 +121,7 @@ def _of(item: pytest.Item) -> Iterator[Experiment]:
     """The experiment of a test of one repetition, if it tells and runs without a window."""
     from pytest_simbench.experiment.experiment import Experiment
     from pytest_simbench.experiment.variants import Variant
-    from pytest_simbench.plugin.marks import number_mark
+    from pytest_simbench.plugin.marks import number
     from pytest_simbench.simulator import SimulatorError
     from pytest_simbench.tasks.base import Task
 
@@ -139,6 +139,5 @@ def _of(item: pytest.Item) -> Iterator[Experiment]:
         return
     with suppress(SimulatorError):  # its test tells
         found = Experiment(case_of(item.config, variant, item, {}), task)
-        asked = options.value(item.config, "sim_reps") or number_mark(item, "reps")
-        if found.sole or asked == 1:
+        if found.sole or number(item, "sim_reps") == 1:
             yield found

@@ -162,6 +162,14 @@ def _check_keywords(mark: pytest.Mark, node: Any) -> None:
             raise pytest.UsageError(f"{node.nodeid}: {mark.name}: {key} must be a text")
 
 
+def number(item: pytest.Item, name: str) -> Any:
+    """What an option says of a test: as it is typed, else as the test's mark of the same name has
+    it, else as the ini file has it."""
+    typed = options.given(item.config, name)
+    found = None if typed else number_mark(item, options.name_of(options.option(name).flag))
+    return options.value(item.config, name) if found is None else found
+
+
 def number_mark(node: Any, name: str) -> Any:
     """The number in a mark such as `reps(5)`, or None without the mark.
 

@@ -25,7 +25,7 @@ from pytest_simbench.measure.verdicts import Verdict as DataVerdict
 from pytest_simbench.plugin import options, recording
 from pytest_simbench.plugin.arguments import can_do, checked_task, failing, refuse
 from pytest_simbench.plugin.benchmark import give_rounds
-from pytest_simbench.plugin.marks import number_mark
+from pytest_simbench.plugin.marks import number
 from pytest_simbench.plugin.run import Run
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.claims import Claim
@@ -59,7 +59,7 @@ class RepeatFixture:
         One of which records say the same as of an earlier one fails the test: the repetitions could
         not be told apart. The same task with other parameters is another one.
         """
-        wanted = options.value(self.node.config, "sim_reps")
+        wanted = number(self.node, "sim_reps")
         skips = session_of(self.node.config).selection.every_robot
         experiment = can_do(Experiment(self.case, checked_task(task, "repeat")), skips)
         known = (task.name, text(plain(task.parameters())), scene_digest(task))
@@ -91,8 +91,7 @@ class RepeatFixture:
             first = up_to(plan.looks[0])
             result: ResultSet = SequentialResultSet(first, metrics, plan, up_to)
         else:
-            asked = wanted or number_mark(self.node, "reps")
-            result = ResultSet(up_to(experiment.repetitions(asked)), metrics)
+            result = ResultSet(up_to(experiment.repetitions(wanted)), metrics)
         recording.photograph(self.node.config, experiment, result.records, self.run.tell)
         result.strict = options.value(self.node.config, "sim_strict")
         result.warns = False
@@ -100,13 +99,9 @@ class RepeatFixture:
         return result
 
     def check_crashes(self) -> None:
-        """Fail the test when more repetitions crashed than may: `--sim-crashes`, else the mark of
-        that name, else none; at the time steps of a sweep a crash is a finding, and all may."""
-        config, most = self.node.config, None
-        if not options.given(config, "sim_crashes"):
-            most = number_mark(self.node, "sim_crashes")
-        if most is None:
-            most = options.value(config, "sim_crashes")
+        """Fail the test when more repetitions crashed than may: as asked, else none; at the time
+        steps of a sweep a crash is a finding, and all may."""
+        most = number(self.node, "sim_crashes")
         if most is None:
             most = 0.0 if self.case.own_timestep is None else 1.0
         with failing(AssertionError):
@@ -149,6 +144,7 @@ def claim_of(case: Case, result: ResultSet, metric: Metric, judgement: Judgement
         high=bounds.high,
         n=bounds.n,
         crashed=len(result.crashed),
+        without=result.without(metric),
         advice=judgement.advice,
     )
 

@@ -205,7 +205,8 @@ class Run:
         return self._attempts[key]
 
     def take(self, experiment: Experiment, wanted: int | None) -> dict[int, Record]:
-        """By repetition what the run that is completed has recorded; of this run from now on.
+        """By repetition what the run that is completed has recorded; of this run from now on, while
+        what it said of the test's claims counts no more.
 
         Raises:
             NotResumed: it was of another configuration.
@@ -214,6 +215,8 @@ class Run:
             return {}
         found = self.resumed.take(experiment, wanted)
         self.folder.take_over(found.values())
+        for claim in self.resumed.claims.pop(experiment.case.test, ()):
+            self.folder.claim(replace(claim, verdict=""))
         return found
 
     def describe(self, task: Task) -> None:
@@ -237,12 +240,13 @@ class Run:
         return thresholds.typed(self.config) if given else {}
 
     def check_thresholds(self, session: pytest.Session) -> None:
-        """When all tests have ended: fail the run for a threshold of a metric that none has."""
+        """When all tests have ended: fail the run for a threshold that none asked for."""
         ended = session.exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
         if not ended or session.shouldstop or session.shouldfail:
             return  # some tests have not run, and may know it
         if self._thresholds and (self.reading.records or self.reading.thresholds):
-            self.mistake = for_terminal(thresholds.problem(self._thresholds, self.reading))
+            passed = session.exitstatus == pytest.ExitCode.OK
+            self.mistake = for_terminal(thresholds.problem(self._thresholds, self.reading, passed))
             if self.mistake:
                 session.exitstatus = pytest.ExitCode.USAGE_ERROR
 

@@ -227,7 +227,7 @@ class SimSession:
     @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """Compare with the baseline; a metric that is worse than allowed fails the run, and so do
-        a limit that compared nothing and a threshold of a metric that no test has."""
+        a limit that compared nothing and a threshold that no test asked for."""
         if self._received:
             self.run.receive(self._received)
         if self.in_worker:

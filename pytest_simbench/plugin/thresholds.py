@@ -37,16 +37,21 @@ def bad_value(given: Mapping[str, float], metrics: Iterable[Metric] = OF_EVERY_T
     return ""
 
 
-def problem(given: Mapping[str, float], run: RunContents) -> str:
+def problem(given: Mapping[str, float], run: RunContents, passed: bool) -> str:
     """What is wrong with thresholds, once the tests have run; else nothing.
 
     Valid are the metrics of the tasks that were performed, the costs, `crashed`, and every name
-    that a test asked a threshold of.
+    that a test asked a threshold of; where all tests passed, and so asked for all of theirs, only
+    the last.
     """
     metrics = [*OF_EVERY_TASK, *(m for found in run.metrics.values() for m in found)]
-    known = {metric.name for metric in metrics} | {asked.metric for asked in run.thresholds}
+    asked = {threshold.metric for threshold in run.thresholds}
+    known = {metric.name for metric in metrics} | asked
     for name in sorted(given.keys() - known):
         return f"{_typed(name, given)}: {UnknownMetric(name, known)}"
+    for name in sorted(given.keys() - asked) * passed:
+        told = f"no test that ran asks for it; in a test, the fixture threshold({name!r}, ...) does"
+        return f"{_typed(name, given)}: {told}"
     return bad_value(given, metrics)
 
 

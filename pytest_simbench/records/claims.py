@@ -8,8 +8,9 @@ from typing import Literal
 from pytest_simbench.records.checked import Count, Name
 from pytest_simbench.records.description import FolderLine
 
-Verdict = Literal["PASS", "FAIL", "UNDECIDED", "XFAIL"]
-"""What the repetitions say; XFAIL: it fails, and so its test was expected to."""
+Verdict = Literal["PASS", "FAIL", "UNDECIDED", "XFAIL", ""]
+"""What the repetitions say; XFAIL: it fails, and so its test was expected to; empty: nothing any
+more, since the test is judged anew."""
 
 Relation = Literal["at least", "at most"]
 
@@ -27,6 +28,7 @@ class Claim(FolderLine):
         verdict: what the repetitions say of it.
         mean, low, high: what was measured, and the bounds that decided; None where there are none.
         n, crashed: repetitions that were judged, and those of them that crashed.
+        without: finished repetitions that have no value.
         advice: what to do about one that is not decided; why a test as a whole failed.
     """
 
@@ -46,6 +48,7 @@ class Claim(FolderLine):
     high: float | None = None
     n: Count = 0
     crashed: Count = 0
+    without: Count = 0
     advice: str = ""
     number: Count = 0
 

@@ -128,11 +128,12 @@ TASK = "task."
 
 
 def _values(record: Record, use: Use) -> dict[str, Any]:
+    untold: tuple[Any, ...] = ("",) if record.ok else ("", [])
     return {
         key: value
         for name in equal_to(use)
         for key, value in _flat(name, getattr(record, name))
-        if not (name in NEW | LATE and value == "")
+        if not (name in NEW | LATE and value in untold)
         and not (use == "rank" and name == "settings" and not key.startswith(f"settings.{TASK}"))
     }
 

@@ -30,6 +30,9 @@ from pytest_simbench.worker.wire import pack
 DEPTH = 10
 """Objects in objects that are looked into."""
 
+WEIGHTS = 1000
+"""So many of an array's numbers at most are looked at, evenly spread: networks are large."""
+
 NAMED = ModuleType | type | Logger
 """What is told by its name alone."""
 
@@ -121,8 +124,10 @@ def _packed(value: Any, known: Known | None, depth: int) -> Any:
     array = isinstance(value, np.ndarray | np.generic) and not value.dtype.hasobject
     if array or isinstance(value, str | bytes | int | float | complex | None):
         return pack(value)
-    if hasattr(type(value), "tolist"):  # the weights of a network
-        return _packed(value.tolist(), known, depth)
+    if hasattr(type(value), "tolist") and hasattr(type(value), "reshape"):  # a network's weights
+        flat = value.reshape(-1)
+        seen = flat[:: 1 + len(flat) // WEIGHTS].tolist()
+        return [*value.shape], _packed(seen, known, depth)
     if known is None:
         return _at_first(value)
     if id(value) not in known:

@@ -217,6 +217,15 @@ def test_a_value_that_one_test_has_lost_fails_a_typed_limit(left: int, why: str)
         assert any(t.startswith(told) for t in (*report.failures, *report.notes))
 
 
+def test_values_that_get_fewer_are_told_and_fail() -> None:
+    """The run passed on those that were left."""
+    here = made([0.1] * 12, metric="landing_error")
+    half = [replace(r, metrics={}) if r.seed % 2 else r for r in here]
+    (told,) = run(here, half, "landing_error:1").failures
+    assert "repetitions without landing_error rose from 0 % to 50 % (worse by 50 points" in told
+    assert run(half, here, "landing_error:1").failures == ()
+
+
 def test_seeds_pair_where_they_can() -> None:
     rng = np.random.default_rng(22)
     before = np.round(rng.uniform(0.3, 0.9, 20), 3)

@@ -79,6 +79,20 @@ def test_marks(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["*pybullet has no gpu*"])
 
 
+@pytest.mark.parametrize(
+    ("typed", "is_"), [("", (3, 50.0)), ("--reps=2 --sim-timeout=40", (2, 40.0))]
+)
+def test_a_mark_stands_between_the_command_line_and_the_ini_file(
+    pytester: pytest.Pytester, typed: str, is_: tuple[int, float]
+) -> None:
+    pytester.makeini("[pytest]\nreps = 1\nsim_timeout = 30\n")
+    marks = "import pytest\npytestmark = [pytest.mark.reps(3), pytest.mark.sim_timeout(50)]\n"
+    pytester.makepyfile(marks + FALLING)
+    run_pytest(pytester, f"--sim=mujoco --sim-output=o {typed}", passed=1)
+    found = records("o")
+    assert (len(found), found[0]["limits"]["timeout"]) == is_
+
+
 def test_benchmark_rounds_are_worker_seconds_and_compare(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(CLAIMING)
     arguments = ["--sim=mujoco", "--reps=3", "--benchmark-autosave"]

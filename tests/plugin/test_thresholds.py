@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.plugin.inner import run_pytest
+from tests.plugin.inner import CLAIMING, run_pytest
 
 TEST = """
     import pytest
@@ -49,6 +49,15 @@ def test_a_name_that_no_test_knows_is_told_at_the_end(
         ]
     )
     assert result.stdout.str().count("no metric is named") == 1
+
+
+def test_a_claim_with_a_number_of_its_own_has_no_threshold_to_change(
+    pytester: pytest.Pytester,
+) -> None:
+    pytester.makepyfile(CLAIMING)
+    words = "--sim=mujoco --reps=5 --sim-threshold=landed=0.9"
+    result = run_pytest(pytester, words, passed=1, ret=pytest.ExitCode.USAGE_ERROR)
+    result.stdout.fnmatch_lines(["ERROR: --sim-threshold=landed=0.9: no test that ran asks for*"])
 
 
 def test_a_run_that_x_stops_has_its_result_and_knows_no_names(pytester: pytest.Pytester) -> None:

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tests.plugin.inner import records, run_pytest
+from tests.plugin.inner import CLAIMING, FALLING, records, run_pytest
 
 DYING = """
     import os
@@ -176,3 +176,13 @@ def test_each_of_several_claims_that_are_alike_is_told(pytester: pytest.Pytester
              "test_falling: landed >= 90 %  UNDECIDED 100 *",
              "test_falling: landed >= 10 %  PASS 100 *"]
         )  # fmt: skip
+
+
+def test_what_a_resumed_test_claims_no_more_is_not_told(pytester: pytest.Pytester) -> None:
+    """A verdict on fewer repetitions stood beside those that contradicted it."""
+    for folder, test, told in (
+        ("--sim-output=a", CLAIMING, "PASS   1 of 1 claims*"),
+        ("--sim-resume=a", FALLING, "no claim was judged*"),
+    ):
+        pytester.makepyfile(test)
+        run_pytest(pytester, "--sim=mujoco --reps=5", folder).stdout.fnmatch_lines([told])

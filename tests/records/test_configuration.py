@@ -156,6 +156,13 @@ def test_equal_runs_differ_in_nothing() -> None:
     assert differences({"t": ([record(0), record(1)], [record(5)])}) == []
 
 
+def test_what_a_repetition_that_was_cut_short_did_not_learn_is_no_difference() -> None:
+    told = record(0, deviations=("no armature",))
+    cut = replace(told, status="interrupted", deviations=())
+    assert differences({"t": ([told], [told, cut])}) == []
+    assert differences({"t": ([told], [replace(cut, status="ok")])})
+
+
 def test_settings_versions_machines_and_profile_are_named() -> None:
     now = record(
         0,

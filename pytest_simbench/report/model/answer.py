@@ -138,8 +138,10 @@ def _values(metric: Metric, summary: TaskSummary) -> Mapping[int, str]:
 
 
 def _finished(count: int, row: Row) -> str:
-    """Of how many repetitions a value is that a crashed one does not have."""
-    return f" (of {count} that finished)" if row.failed and count < row.attempts else ""
+    """Of how many repetitions a value is that not all have."""
+    if row.failed and count == row.attempts - row.failed:
+        return f" (of {count} that finished)"
+    return f" ({count} of {row.attempts} repetitions)" if count < row.attempts else ""
 
 
 def _amount(found: Difference) -> str:

@@ -91,6 +91,11 @@ class _Told:
         bounds = f" [{', '.join(ends)}]" if len(ends) == 2 and ends[0] != ends[1] else ""
         return f"{significant(scale * claim.mean)}{bounds}"
 
+    @property
+    def without(self) -> str:
+        """How many finished repetitions have no value."""
+        return f", {self.claim.without} without a value" if self.claim.without else ""
+
 
 def claims_of(reading: RunContents, comparison: GateReport | None = None) -> Claims:
     """Of a run, with the limits against its baseline."""
@@ -136,7 +141,8 @@ def _that_count(found: Sequence[Claim], crashed: Collection[str]) -> list[Claim]
     """The last of each; of a test as a whole, only that it failed and no claim of it says why. What
     failed counts no more where the resumed test passed as a whole, nor what an earlier attempt of
     a test said of crashes where its last one has none."""
-    every = {claim.identity: claim for claim in found}.values()
+    last_of = {claim.identity: claim for claim in found}
+    every = [claim for claim in last_of.values() if claim.verdict]
     passed = {claim.test for claim in every if not claim.metric and claim.verdict == "PASS"}
     last = [
         claim
@@ -192,7 +198,7 @@ def _table(told: Sequence[_Told]) -> Table:
 def _cell(told: Sequence[_Told]) -> str:
     """Verdict and value; of several claims how many have each verdict."""
     if len(told) == 1:
-        return f"{told[0].claim.verdict} {told[0].value}".rstrip()
+        return f"{told[0].claim.verdict} {told[0].value}".rstrip() + told[0].without
     count = Counter[str](one.claim.verdict for one in told)
     return ", ".join(f"{count[verdict]} {verdict}" for verdict in ORDER if count[verdict])
 
@@ -206,7 +212,7 @@ def _trouble(told: _Told, records: Sequence[Record]) -> Trouble:
         worst = next(iter([*crashed, *records]), None)
         return Trouble(f"{test}: {claim.advice}", "", command(worst) if worst else "")
     many = f", {claim.crashed} crashed" if claim.crashed else ""
-    what = f"{test}: {told.claimed} is {told.value} over {claim.n} repetitions{many}"
+    what = f"{test}: {told.claimed} is {told.value} over {claim.n} repetitions{many}{told.without}"
     own = [record for record in records if record.task == claim.task]
     worst = next((record for record in crashed if record in own), None)
     why = f"crashed: {worst.error.cause}" if worst and worst.error else ""

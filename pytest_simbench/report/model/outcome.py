@@ -91,8 +91,10 @@ def _changes(data: Any) -> list[dict[str, Any]]:
 def looks_at(folder: Path, before: Iterable[Record], now: Iterable[Record]) -> int:
     """How often a run has been judged, with this time: one that ended and to one of whose tests
     repetitions were added was looked at before. Tests that are new, of a further release for
-    instance, are looked at for the first time."""
+    instance, or were cut short before they were judged are looked at for the first time."""
+    before = list(before)
     ended = ([r for r in records if r.status != "interrupted"] for records in (before, now))
     old, new = ({(r.test, r.repetition) for r in records} for records in ended)
-    more = {test for test, _ in new - old} & {test for test, _ in old}
+    cut = {(r.test, r.repetition) for r in before} - old
+    more = {test for test, _ in new - old} & {test for test, _ in old} - {test for test, _ in cut}
     return RunOutcome.read(folder)[0].looks + bool(more and (folder / NAME).exists())

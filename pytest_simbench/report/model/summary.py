@@ -236,6 +236,9 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row
     notes = list(dict.fromkeys(r.notes.untested for r in records if r.notes.untested))
     again = published_again((r.task, r.seed, r.notes.sample, r.notes.chosen_on) for r in done)
     notes += [again] * bool(again)
+    without = {m.name: results.without(m) for m in metrics}
+    if told := [f"{k} {n} of {len(done)}" for k, n in without.items() if 0 < n < len(done)]:
+        notes.append(f"finished repetitions without a value: {', '.join(told)}")
     if any(record.contended for record in done):
         notes.append("repetitions ran in parallel: its times and CPU are contended")
     if any(record.notes.filmed for record in done):

@@ -101,6 +101,12 @@ def test_a_claim_that_fails_names_the_worst_repetition_and_how_to_see_it_again()
     assert "--sim-name=drake" in trouble.again
 
 
+def test_repetitions_without_a_value_are_told() -> None:
+    found = claims_of(reading(claim(n=6, without=6), replace(FAILED, without=1)))
+    assert found.table.columns[1].cells[0].text == "PASS 100, 6 without a value"
+    assert found.troubles[0].what.endswith("over 2 repetitions, 1 without a value")
+
+
 def test_a_crash_is_worse_than_any_value() -> None:
     records = (*RECORDS, stacked("drake", 3, None))
     (trouble,) = claims_of(reading(FAILED, records=records)).troubles

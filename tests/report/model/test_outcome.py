@@ -90,6 +90,7 @@ def test_a_run_that_was_interrupted_before_anything_ended_was_not_looked_at(tmp_
     assert looks_at(tmp_path, [interrupted], [ended]) == 2
     assert looks_at(tmp_path, [ended], [ended, record(repetition=3)]) == 3
     assert looks_at(tmp_path, [ended], [ended, interrupted]) == 2
+    assert looks_at(tmp_path, [ended, interrupted], [ended, record(repetition=1)]) == 2
     another = record(repetition=1, simulator="mujoco==3.3.7", test="test_x[mujoco==3.3.7-headless]")
     assert looks_at(tmp_path, [ended], [ended, another]) == 2  # of a history that has grown
     assert looks_at(tmp_path, [ended, ended], [ended, record(repetition=3)]) == 3  # run again
