@@ -166,7 +166,7 @@ def test_many_simulators_are_not_all_named() -> None:
 def test_a_metric_without_a_good_direction_is_not_ranked() -> None:
     metric = Metric("score", "landing", "m", None, study=True)
     assert sentences(task({"a": 1.1}, (), metric, failed=1)) == [
-        "landing: a 1.1 m [1, 1.2] (20 of 21 repetitions).",
+        "landing: a 1.1 m [1, 1.2] (of 20 that finished).",
         "crashes: a 1 of 21.",
     ]
     two = sentences(task({"a": 1.1, "b": 2.1}, ("a!b",), metric))[0]
