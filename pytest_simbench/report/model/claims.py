@@ -253,8 +253,9 @@ def command(record: Record) -> str:
     fine = name and record.test.isprintable() and not file.startswith(("-", "/", "."))
     if not fine or ".." in file or not file.endswith(".py"):
         return ""
+    built = any(option.startswith("--sim-name=") for option in record.notes.needs)
     options = [
-        f"--sim-name={record.simulator}",
+        *[f"--sim-name={record.simulator}"] * (not built),
         f"--sim-seed={record.seed}",
         "--sim-reps=1",
         f"--sim-profile={record.notes.profile_file or record.profile}",
