@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from pytest_simbench.cli.values import refusing
+from pytest_simbench.ground.versions import BUILD
 from pytest_simbench.plugin import arguments, cluster, options, recording
 from pytest_simbench.plugin.policies import FIXTURE as POLICY
 from pytest_simbench.plugin.session import session_of
@@ -53,7 +54,7 @@ def case_of(
         function, others = named(item, made_for.id_with(len(chosen.profiles)))
         of_test = {"test": item.nodeid, "function": function, "variant": others}
         timeout = number(item, "sim_timeout")
-        of_test |= {"needs": _needs(item)}
+        of_test |= {"needs": _needs(item, name)}
         own = arguments.checked_settings(settings, made_for, chosen)
     return chosen.case(
         made_for,
@@ -69,13 +70,15 @@ def case_of(
     )
 
 
-def _needs(item: pytest.Item) -> tuple[str, ...]:
-    """The options with files of the user's that a test is made of, as they are typed."""
+def _needs(item: pytest.Item, name: str) -> tuple[str, ...]:
+    """The options with files of the user's that a test is made of, as they are typed: its build of
+    a simulator, its policies, its scene."""
     fixtures = getattr(item, "fixturenames", ())
     policies = options.value(item.config, "sim_policies") if POLICY in fixtures else None
     scene = options.value(item.config, "sim_scene") if "scene_file" in fixtures else None
     typed = ",".join(f"{path}:{name}" if name else path for path, name in policies or ())
-    given = {"policies": typed, "scene": scene}
+    python = session_of(item.config).selection.pythons.get(name) if BUILD in name else None
+    given = {"name": python and f"{name}={python}", "policies": typed, "scene": scene}
     return tuple(f"--sim-{option}={files}" for option, files in given.items() if files)
 
 

@@ -317,7 +317,11 @@ class Run:
             page = markdown.render_run(written)
             problems.append(append_summary("\n".join([changes, page])))
         verbose = self.config.get_verbosity() > 0
-        for title, text in runs.sections(written, reporter._tw.fullwidth, verbose):
+        claims = written.claims and written.claims.seen_from(
+            self.config.invocation_params.dir, self.config.rootpath
+        )
+        here = replace(written, claims=claims)
+        for title, text in runs.sections(here, reporter._tw.fullwidth, verbose):
             reporter.write_sep("=", title)
             reporter.write_line(text)
         passed = passed and not self.failing

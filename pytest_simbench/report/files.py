@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pytest_simbench.ground.text import for_csv, for_terminal
+from pytest_simbench.records.configuration import task_parameters
 from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
@@ -185,13 +186,14 @@ def _unwritable(path: Path, error: OSError) -> str:
 def columns_of(records: Sequence[Record]) -> dict[str, list[Any]]:
     """A value for each repetition, None where it has none, in each column.
 
-    Columns: what identifies it, its error, `metrics.<name>`, `cost.<name>` (see
-    `records.metrics.COSTS`) and `seconds.<phase>`.
+    Columns: what identifies it, the task's parameters as JSON, its error, `metrics.<name>`,
+    `cost.<name>` (see `records.metrics.COSTS`) and `seconds.<phase>`.
     """
     metrics = dict.fromkeys(name for record in records for name in record.metrics)
     errors = ("type", "phase", "message")
     return {
         **{name: [getattr(r, name) for r in records] for name in IDENTITY},
+        "parameters": [task_parameters(record) for record in records],
         **{f"error.{name}": [getattr(r.error, name, None) for r in records] for name in errors},
         **{f"metrics.{name}": [r.metrics.get(name) for r in records] for name in metrics},
         **{f"cost.{cost.name}": [r.cost(cost.name) for r in records] for cost in COSTS},

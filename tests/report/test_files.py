@@ -22,7 +22,7 @@ from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report.files import Written, write_badge, write_files, write_tables
+from pytest_simbench.report.files import Written, columns_of, write_badge, write_files, write_tables
 from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
 from pytest_simbench.report.markdown.run import render_run
 from pytest_simbench.report.model.report import Report
@@ -45,6 +45,11 @@ def folder_of(path: Path, *records: Record, described: bool = True) -> RunFolder
 
 def written_in(folder: RunFolder) -> Written:
     return write_files(folder.path, Report.of(folder.read()))
+
+
+def test_the_csv_file_tells_tasks_of_one_test_apart() -> None:
+    two = [record(settings={"task.towers": k, "timestep": 0.002}) for k in (3, 4)]
+    assert columns_of(two)["parameters"] == ['{"task.towers": 3}', '{"task.towers": 4}']
 
 
 def test_a_folder_is_all_that_it_takes(tmp_path: Path) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
+from pathlib import Path
 
 from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.records.claims import Claim
@@ -56,6 +58,16 @@ class Claims:
     table: Table
     troubles: Sequence[Trouble]
     more: int
+
+    def seen_from(self, folder: Path, root: Path) -> Claims:
+        """With commands for that folder; they are for pytest's root folder."""
+        way = os.path.relpath(root, folder)
+        if way == os.curdir:
+            return self
+        found = [(trouble, shlex.split(trouble.again)) for trouble in self.troubles]
+        for _, words in found:
+            words[1:2] = [os.path.join(way, word) for word in words[1:2]]
+        return replace(self, troubles=[replace(t, again=shlex.join(words)) for t, words in found])
 
 
 @dataclass(frozen=True)
@@ -241,8 +253,9 @@ def command(record: Record) -> str:
     fine = name and record.test.isprintable() and not file.startswith(("-", "/", "."))
     if not fine or ".." in file or not file.endswith(".py"):
         return ""
+    built = any(option.startswith("--sim-name=") for option in record.notes.needs)
     options = [
-        f"--sim-name={record.simulator}",
+        *[f"--sim-name={record.simulator}"] * (not built),
         f"--sim-seed={record.seed}",
         "--sim-reps=1",
         f"--sim-profile={record.notes.profile_file or record.profile}",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -105,6 +106,14 @@ def test_repetitions_without_a_value_are_told() -> None:
     found = claims_of(reading(claim(n=6, without=6), replace(FAILED, without=1)))
     assert found.table.columns[1].cells[0].text == "PASS 100, 6 without a value"
     assert found.troubles[0].what.endswith("over 2 repetitions, 1 without a value")
+
+
+def test_the_command_is_for_the_folder_that_pytest_was_called_from() -> None:
+    found = claims_of(reading(FAILED), GateReport(broken=("x",)))
+    assert found.seen_from(Path("/a"), Path("/a")) is found
+    none, trouble = found.seen_from(Path("/a/sub"), Path("/a")).troubles
+    assert none.again == ""
+    assert trouble.again.startswith(f"pytest '../{STACK}[drake-headless]' --sim-name=drake")
 
 
 def test_a_crash_is_worse_than_any_value() -> None:

@@ -122,6 +122,13 @@ def test_the_command_runs_one_of_several_profiles_and_time_steps_alone() -> None
     assert {"--sim-profile=default", "--sim-set=mujoco.timestep=0.0005"} <= set(words)
 
 
+def test_the_command_names_the_interpreter_of_a_build() -> None:
+    needs = ("--sim-name=mujoco@mine=/opt/python",)
+    given = record(test="test_x.py::test_x", simulator="mujoco@mine", notes=Notes(needs=needs))
+    named = [word for word in shlex.split(command(given)) if word.startswith("--sim-name")]
+    assert named == [*needs]
+
+
 @pytest.mark.parametrize(
     "test",
     ["test_x[mujoco]", "-p evil.py::x", "/etc/x.py::y", "../x.py::y", "a/../../x.py::y",
