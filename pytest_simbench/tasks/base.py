@@ -16,7 +16,7 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.notes import Wait
 from pytest_simbench.records.readings import Reading
 from pytest_simbench.scene import Box, Pose, Robot, Scene, Vector3
-from pytest_simbench.tasks.identity import told
+from pytest_simbench.tasks.recorded import recorded
 
 CUBE_SIZE = 0.05
 """Edge of every cube [m] (the study)."""
@@ -156,7 +156,7 @@ class Task(ABC):
         """Every parameter under its name in records: `task.levels`, `task.speeds.carry`. The robot
         is a part of the record by itself."""
         names = [item.name for item in fields(self) if item.name != ROBOT]  # type: ignore[arg-type]
-        values = {name: told(getattr(self, name)) for name in names}
+        values = {name: recorded(getattr(self, name)) for name in names}
         scaled = {} if self.scale == 1.0 else {"task.scale": self.scale}
         return {**dict(_flat("task", values)), **scaled}
 

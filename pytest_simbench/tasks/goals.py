@@ -24,8 +24,8 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, Pose, Robot, Scene
 from pytest_simbench.scene.policy import Observation, checked, name_of
 from pytest_simbench.tasks.base import Count, Jitter, Outcome, Randomness, Task, cube
-from pytest_simbench.tasks.identity import digest, told
 from pytest_simbench.tasks.pushing import BLOCK_MASS, BLOCK_SIZE, FRICTION, RED
+from pytest_simbench.tasks.recorded import digest, recorded
 
 HELD = 0.5
 """What is at its goal for so long [s] has come to stay."""
@@ -99,7 +99,7 @@ class GoalTask(Task):
         """The policy by its name, and by a digest of its source and of what it holds."""
         names = [item.name for item in fields(self) if item.name not in ("policy", "robot")]
         return {
-            **{f"task.{name}": told(getattr(self, name)) for name in names},
+            **{f"task.{name}": recorded(getattr(self, name)) for name in names},
             "task.policy": name_of(self.policy),
             "task.policy_digest": digest(self.policy),
         }

@@ -21,7 +21,7 @@ from pytest_simbench.scene import Pose
 from pytest_simbench.scene.policy import Command, Observation, as_policy
 from pytest_simbench.tasks import GoalTask, Jitter, PickAndPlace, PushingToGoal, Reaching
 from pytest_simbench.tasks.base import Outcome
-from pytest_simbench.tasks.identity import digest
+from pytest_simbench.tasks.recorded import digest
 from tests.conftest import performed
 from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, put
 
@@ -132,8 +132,19 @@ def test_a_record_tells_which_policy_it_was() -> None:
         inner.around = [{"held": Held(inner)}]  # type: ignore[attr-defined]
         return inner
 
+    class Weights:
+        """As large as a network's."""
+
+        shape, tolist = (10**6,), None
+
+        def __init__(self, gain: float) -> None:
+            self.gain = gain
+
+        def reshape(self, *_: int) -> Any:
+            return np.full(self.shape, self.gain)
+
     for held in (
-        Held, closed, circle,
+        Held, closed, circle, Weights,
         lambda gain: partial(open_loop, Held(gain)),
         lambda gain: lambda seen, gain=gain: gain,
         lambda gain: Fraction(gain),

@@ -47,18 +47,18 @@ Known = dict[int, tuple[Any, str]]
 """Objects of one digest, by identity, and their own digests; empty while they are looked into."""
 
 
-def told(value: Any) -> Any:
+def recorded(value: Any) -> Any:
     """A value as records hold it; an object by its name and digest."""
     if is_dataclass(value) and not isinstance(value, type):
         value = {item.name: getattr(value, item.name) for item in fields(value)}
     if isinstance(value, Mapping):
-        return {key: told(item) for key, item in value.items()}
+        return {key: recorded(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):
-        return [told(item) for item in value]
+        return [recorded(item) for item in value]
     if isinstance(value, set | frozenset):
-        return sorted(str(told(item)) for item in value)
+        return sorted(str(recorded(item)) for item in value)
     if isinstance(value, str | int | float | None):
         return value
     if isinstance(value, PurePath | np.generic):
