@@ -111,13 +111,15 @@ class RepeatFixture:
     def finish(self, benchmark: Any) -> None:
         """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
         alike = Counter[tuple[object, ...]]()
-        for result in self.results:
-            self.node.user_properties.extend(_properties(result))
+        for k, result in enumerate(self.results, start=1):
+            which = f"{result.records[0].task} {k}: " if len(self.results) > 1 else ""
+            for name, value in _properties(result):
+                self.node.user_properties.append((in_one_line(f"{which}{name}"), value))
             for metric, judgement in result.judged:
                 claim = claim_of(self.case, result, metric, judgement)
                 self.run.folder.claim(replace(claim, number=alike[claim.identity]))
                 alike[claim.identity] += 1
-                title = in_one_line(f"claim {metric.name} {judgement.claim}")
+                title = in_one_line(f"{which}claim {metric.name} {judgement.claim}")
                 self.node.user_properties.append((title, claim.verdict))
         if self.results and benchmark is not None:
             give_rounds(benchmark, self.results, self.described.values())
@@ -155,9 +157,8 @@ def _properties(result: ResultSet) -> Iterator[tuple[str, float]]:
     yield "crashed", len(result.crashed)
     for known in result.known:
         found = result.interval(known)
-        name = in_one_line(known)
         if found.n:
-            yield name, found.mean
+            yield known, found.mean
             if isfinite(found.half_width):
-                yield f"{name}.low", found.low
-                yield f"{name}.high", found.high
+                yield f"{known}.low", found.low
+                yield f"{known}.high", found.high

@@ -173,3 +173,11 @@ def test_junit_has_a_property_for_each_metric(
     assert found["landed"] == "1.0"
     assert 0.1 < float(found["landed.low"] or "nan") < 0.2  # 2 of 2 prove little
     assert {"rtf", "ram", "cpu", "start", "end"} <= found.keys()
+    pytester.makepyfile(
+        TEST.replace("        repeat", "        repeat(Falling(0.1))\n        repeat")
+    )
+    run_pytest(pytester, "--sim=mujoco --reps=1 --junitxml=junit.xml", passed=1)
+    tree = ElementTree.parse(pytester.path / "junit.xml")
+    names = [str(item.get("name")) for item in tree.iter("property")]
+    assert len({*names}) == len(names)
+    assert {"falling 1: landed", "falling 2: landed"} <= {*names}
