@@ -49,7 +49,8 @@ def robot_cache(function: Callable[Concatenate[Robot, P], T]) -> Callable[Concat
 
     @wraps(function)
     def asked(robot: Robot, /, *others: P.args, **named: P.kwargs) -> T:
-        return found(last_change(robot), robot, *others, **named)  # type: ignore[arg-type]
+        own = robot.limits, robot.swing, robot.stand  # are no part of its equality
+        return found((last_change(robot), own), robot, *others, **named)  # type: ignore[arg-type]
 
     return asked
 

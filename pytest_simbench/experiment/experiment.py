@@ -61,10 +61,21 @@ class Experiment:
         """Whether one repetition is all there is: others would be the same."""
         return self.case.deterministic and not self.task.draws
 
+    @property
+    def most(self) -> int | None:
+        """How many there can be before one is the copy of another: one of a task that draws
+        nothing, else one for each measured motion; None where chance makes each another."""
+        if not self.case.deterministic:
+            return None
+        if self.sole:
+            return 1
+        return self.task.repetitions if self.task.sample(self.case.seed) else None
+
     def repetitions(self, asked: int | None) -> int:
-        """How many there are to be: what is asked for, else what the task or the protocol has."""
+        """How many there are to be: what is asked for, else what the task or the protocol has; none
+        that would be a copy."""
         number = asked or self.task.repetitions or self.case.protocol.repetitions
-        return 1 if self.sole else number
+        return min(number, self.most or number)
 
     def scene(self, seed: int) -> Scene:
         """The world that the task begins with, its cubes disturbed as `--jitter` has it."""

@@ -33,7 +33,8 @@ class ChangePoint:
 
     Attributes:
         place: of the first item after the change.
-        before, after: means between this change and the ones next to it.
+        before, after: means between this change and the ones next to it, of the seeds that have a
+            value on both sides, where there are some.
         p_value: probability of such a split without a change, corrected for the number of rows.
     """
 
@@ -57,11 +58,20 @@ def change_points(values: Sequence[Mapping[int, float]], *, rows: int = 1) -> li
     p_values: dict[int, float] = {}
     _search(table, 0, len(table), rows, p_values)
     ends = [0, *sorted(p_values), len(table)]
-    means = [float(np.nanmean(table[start:stop])) for start, stop in pairwise(ends)]
+    parts = [table[start:stop] for start, stop in pairwise(ends)]
     return [
-        ChangePoint(place, means[k], means[k + 1], p_values[place])
-        for k, place in enumerate(ends[1:-1])
+        ChangePoint(place, *_means(*sides), p_values[place])
+        for place, sides in zip(ends[1:-1], pairwise(parts), strict=True)
     ]
+
+
+def _means(first: FloatArray, second: FloatArray) -> tuple[float, float]:
+    """Of the seeds that both have, if there are some: seeds have levels of their own."""
+    both = np.isfinite(first).any(axis=0) & np.isfinite(second).any(axis=0)
+    if not both.any():
+        return float(np.nanmean(first)), float(np.nanmean(second))
+    before, after = (np.nanmean(side[:, both], axis=0).mean() for side in (first, second))
+    return float(before), float(after)
 
 
 def steps(values: Sequence[Mapping[int, float]]) -> list[ChangePoint]:

@@ -22,7 +22,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pytest_simbench.measure.comparison import ALPHA, MARGIN, PERMUTATIONS, FloatArray, equivalence
+from pytest_simbench.measure.comparison import ALPHA, MARGIN, PERMUTATIONS, FloatArray, alike
 from pytest_simbench.measure.intervals import SEED, varies
 from pytest_simbench.measure.speed import POWER, control, evened
 from pytest_simbench.records.metrics import COSTS, CRASHED, Metric
@@ -213,7 +213,7 @@ class _Pair:
     def equivalent(self) -> bool:
         whole = len(self.common) == len(self.seeds) > 1 and self.metric.bounded
         first, second = self.sides.T
-        return whole and equivalence(first, second, MARGIN).equivalent()
+        return whole and alike(first, second, MARGIN, yes_no=self.metric.kind == "yes_no")
 
 
 def _judged(family: Family, tests: Sequence[_Pair]) -> list[Difference]:

@@ -178,7 +178,13 @@ def run_gate(
     }
     tested = [change for of_limit in found.values() for change in of_limit.values()]
     sides = {test: (before[test], after[test]) for test in common}
-    lost, left = _rises(sides, crashes_may, tested, share)
+    limited_in = (
+        (test, after[test].metric(limit.metric))
+        for limit, of_limit in found.items()
+        for test, change in of_limit.items()
+        if isinstance(change, Change) or (change.lost and not typed)
+    )
+    lost, left = _rises(sides, crashes_may, limited_in, share)
     changes = _corrected(tested, left * share)
     limited = {limit.metric for limit in limits}
     others = _corrected(
@@ -289,25 +295,24 @@ def _broken(test: str, old: ResultSet, new: ResultSet) -> str:
 def _rises(
     sides: Mapping[str, tuple[ResultSet, ResultSet]],
     crashes_may: Limit,
-    tested: Iterable[Change | Untested],
+    limited: Iterable[tuple[str, Metric]],
     share: float,
 ) -> tuple[list[Change], float]:
     """By test the change of the share of crashed repetitions, then of those that finished without
-    a value of a metric that was compared, which may not rise; and the part of the error that is
-    left for the limits."""
+    a value of a metric that has a limit, which may not rise; and the part of the error that is left
+    for the limits."""
     counted = [
         (test, CRASHED, crashes_may, old.by_seed(CRASHED), new.by_seed(CRASHED))
         for test, (old, new) in sides.items()
     ]
-    for change in (c for c in tested if isinstance(c, Change)):
-        both, name = sides[change.test], f"repetitions without {change.metric.name}"
-        if any(side.without(change.metric) for side in both):
+    for test, metric in limited:
+        both, name = sides[test], f"repetitions without {metric.name}"
+        if any(side.without(metric) for side in both):
             lacking = Metric(name, name, better="lower", kind="yes_no")
             first, second = (
-                {r.seed: float(side.value(r, change.metric) is None) for r in side.ok}
-                for side in both
+                {r.seed: float(side.value(r, metric) is None) for r in side.ok} for side in both
             )
-            counted.append((change.test, lacking, NO_MORE, first, second))
+            counted.append((test, lacking, NO_MORE, first, second))
     found, chances = [], []
     for test, metric, limit, first, second in counted:
         if first and second:

@@ -14,7 +14,7 @@ from pytest_simbench.cli.values import Auto
 from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.identity import scene_digest
+from pytest_simbench.experiment.identity import describe_robot, scene_digest
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.resumed import NotResumed
 from pytest_simbench.experiment.sequential import Plan, SequentialResultSet
@@ -62,7 +62,8 @@ class RepeatFixture:
         wanted = number(self.node, "sim_reps")
         skips = session_of(self.node.config).selection.every_robot
         experiment = can_do(Experiment(self.case, checked_task(task, "repeat")), skips)
-        known = (task.name, text(plain(task.parameters())), scene_digest(task))
+        robot = describe_robot(getattr(task, "robot", None))
+        known = (task.name, text([plain(task.parameters()), robot]), scene_digest(task))
         if known in self.known:
             refuse(
                 f"repeat() is called for the task {task.name!r} a second time in one test with the "
@@ -86,12 +87,13 @@ class RepeatFixture:
                 return repeater.up_to(number, found)
 
         metrics = experiment.task.metrics
-        if isinstance(wanted, Auto) and not experiment.sole:
+        auto = isinstance(wanted, Auto)
+        if auto and not experiment.most:
             plan = Plan.up_to(wanted.limit)
             first = up_to(plan.looks[0])
             result: ResultSet = SequentialResultSet(first, metrics, plan, up_to)
         else:
-            result = ResultSet(up_to(experiment.repetitions(wanted)), metrics)
+            result = ResultSet(up_to(experiment.repetitions(None if auto else wanted)), metrics)
         recording.photograph(self.node.config, experiment, result.records, self.run.tell)
         result.strict = options.value(self.node.config, "sim_strict")
         result.warns = False

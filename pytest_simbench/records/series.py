@@ -252,6 +252,15 @@ def by_test(
     return [{_name(key, every): group for key, group in side.items()} for side in sides]
 
 
+SAME: tuple[Callable[[tuple[str, str], tuple[str, str]], bool], ...] = (
+    lambda a, b: a == b,
+    lambda a, b: a[0] == b[0] != "",
+    lambda a, b: a[1] == b[1],
+    lambda a, b: True,
+)
+"""Which labels and parameters are of one configuration, the surest first."""
+
+
 def _numbered(runs: Sequence[Sequence[list[Record]]]) -> list[dict[int, list[Record]]]:
     """The configurations of each run by number: those with the same label have the same one in all
     runs, then those with the same task parameters, then the rest by their order."""
@@ -260,9 +269,9 @@ def _numbered(runs: Sequence[Sequence[list[Record]]]) -> list[dict[int, list[Rec
     for run, names in zip(runs, labels(runs), strict=True):
         side: dict[int, list[Record]] = {}
         rest = {k: (name, task_parameters(run[k][0])) for k, name in enumerate(names)}
-        for first in range(3):  # the place in a key from which on two must be equal
+        for same in SAME:
             for place, key in [*rest.items()]:
-                alike = (k for k, other in enumerate(known, 1) if other[first:] == key[first:])
+                alike = (k for k, other in enumerate(known, 1) if same(other, key))
                 if number := next((k for k in alike if k not in side), None):
                     side[number] = run[place]
                     del rest[place]

@@ -83,9 +83,10 @@ class GoalTask(Task):
     @property
     def metrics(self) -> tuple[Metric, ...]:
         what = "the tool" if self.moved is None else f"the {self.moved}"
+        near = 100 * self.tolerance * self.scale
         return (
             Metric("success", "success", kind="yes_no", better="higher",
-                   doc=f"{what} is within {100 * self.tolerance:g} cm of the goal at the end"),
+                   doc=f"{what} is within {near:g} cm of the goal at the end"),
             Metric("distance", "distance", unit="m", better="lower", least=0,
                    doc=f"of {what} from the goal at the end"),
             Metric("time", "time to goal", unit="s", better="lower", least=0,

@@ -109,7 +109,8 @@ class Stacking(Task):
 
     def __post_init__(self) -> None:
         check_count(self.towers, f"the number of towers of {self.name}", len(TOWERS))
-        check_count(self.levels, f"the number of levels of {self.name}")
+        most = len(GRID) // self.towers
+        check_count(self.levels, f"the number of levels of {self.name}", most)
 
     @cached_property
     def arm(self) -> Robot:

@@ -9,6 +9,7 @@ from unittest.mock import Mock, call
 
 import pytest
 
+from pytest_simbench.description.robot_files import robot_cache
 from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import describe_robot, expected, scene_digest
@@ -17,6 +18,7 @@ from pytest_simbench.experiment.repetition import Hooks, Repetition, group
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.laws.free import FreeFall
 from pytest_simbench.motion.model import scale_of
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
 from pytest_simbench.records.record import Record
 from pytest_simbench.tasks import Reaching
@@ -78,6 +80,24 @@ def test_what_draws_nothing_is_done_once_where_it_would_be_the_same(
 ) -> None:
     experiment = Experiment(replace(case, deterministic=deterministic), task)
     assert experiment.repetitions(asked) == done
+
+
+def test_measured_motions_are_not_repeated_where_that_would_copy_them(case: Case) -> None:
+    class Three(Falling):
+        repetitions = 3
+
+        def sample(self, seed: int) -> tuple[str, int]:
+            return "tosses", seed % 3
+
+    for deterministic, most in ((True, 3), (False, 20)):
+        experiment = Experiment(replace(case, deterministic=deterministic), Three())
+        assert [experiment.repetitions(asked) for asked in (2, None, 20)] == [2, 3, most]
+
+
+def test_a_robot_with_another_swing_is_computed_anew() -> None:
+    swings = robot_cache(lambda robot: robot.swing)
+    other = replace(panda(), swing=((0.0,) * 7, (0.1,) * 7))
+    assert swings(panda()) != swings(other) == other.swing
 
 
 def test_the_task_has_its_own_time_out_unless_the_case_gives_one(case: Case) -> None:

@@ -80,3 +80,11 @@ def test_a_chance_is_a_share_of_all_orders_with_the_one_seen() -> None:
     part = np.arange(12.0).reshape(-1, 1)
     always, never = _chance(part, -np.inf), _chance(part, np.inf)
     assert (always, never) == (1.0, 1 / (PERMUTATIONS + 1))
+
+
+def test_the_levels_are_of_the_seeds_that_both_sides_have() -> None:
+    """Each seed is slower by 0.1; the slow ones have no value any more."""
+    before = {seed: 1.0 + seed / 10 for seed in range(12)}
+    after = {seed: value + 0.1 for seed, value in before.items() if seed < 8}
+    (found,) = change_points([before] * 3 + [after] * 3)
+    assert found.after - found.before == pytest.approx(0.1)

@@ -14,6 +14,7 @@ from scipy.stats import chi2, chi2_contingency
 from pytest_simbench.measure import comparison
 from pytest_simbench.measure.comparison import (
     Equivalence,
+    alike,
     compare,
     compare_by_seed,
     equivalence,
@@ -205,6 +206,17 @@ def test_equivalence_alarms_in_one_of_twenty_at_its_margin() -> None:
         for _ in range(EXPERIMENTS)
     )
     assert 0.05 - SAMPLING <= claimed / EXPERIMENTS <= 0.05 + SAMPLING
+
+
+@pytest.mark.parametrize(("n", "yes_no"), [(60, True), (90, True), (200, True), (90, False)])
+def test_shares_are_alike_in_one_of_twenty_at_the_margin(n: int, yes_no: bool) -> None:
+    """A t test said so in 12 to 20 of 100 where one repetition in twenty is lost."""
+    rng = np.random.default_rng(15)
+    lost = (rng.random((EXPERIMENTS, n)) >= 0.05).astype(float)
+    claimed = sum(alike(np.ones(n), values, 0.05, yes_no=yes_no) for values in lost)
+    assert claimed / EXPERIMENTS <= 0.05 + SAMPLING
+    rare = np.repeat([1.0, 14 / 15], [n - 10, 10])
+    assert alike(np.ones(n), rare, 0.05, yes_no=False) == (n == 200)
 
 
 def test_equivalence_is_not_the_lack_of_a_difference() -> None:

@@ -120,6 +120,9 @@ def test_tasks_of_a_test_are_matched_by_what_tells_them_apart_and_the_rest_by_or
     assert {name: after[name] for name in before} == before
     before, after = by_test([two + one, three + two])
     assert [(before[name], after[name]) for name in before] == [(two, two), (one, three)]
+    changed = [replace(r, settings={**r.settings, "task.policy": "new"}) for r in two + one]
+    before, after = by_test([one + two, changed])  # what they all share tells none apart
+    assert [after[name][0].settings["task.levels"] for name in before] == [1, 2]
 
 
 def test_a_label_lists_three_differences() -> None:
