@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import re
+import sys
 import weakref
 from collections.abc import Mapping
 from contextlib import suppress
@@ -50,7 +51,9 @@ Known = dict[int, tuple[Any, str]]
 def recorded(value: Any) -> Any:
     """A value as records hold it; an object by its name and digest."""
     if is_dataclass(value) and not isinstance(value, type):
-        value = {item.name: getattr(value, item.name) for item in fields(value)}
+        held = {item.name: getattr(value, item.name) for item in fields(value)}
+        own = _package(type(value)) != _package(recorded)
+        value = held | ({type(value).__name__: _at_first(value)} if own else {})
     if isinstance(value, Mapping):
         return {key: recorded(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
@@ -78,8 +81,9 @@ def digest(policy: Any, known: Known | None = None, depth: int = DEPTH) -> str:
         held |= inspect.getclosurevars(made).nonlocals
         held |= {"defaults": made.__defaults__, "keywords": made.__kwdefaults__}
     written: Any = inspect.unwrap(made) if inspect.isroutine(made) else type(made)
-    with suppress(OSError, TypeError):
-        text.append(_source(getattr(written, "__code__", written)))
+    for part in written.__mro__ if isinstance(written, type) else [written]:
+        if part is written or _package(part) not in {_package(recorded), *sys.stdlib_module_names}:
+            text += _code(part)
     if not hasattr(made, "__dict__"):  # a date, say
         text.append(re.sub("( at)? 0x[0-9a-fA-F]+", "", repr(made)))
     for name, value in sorted(held.items()):
@@ -104,10 +108,31 @@ def _attributes(value: Any) -> dict[str, Any]:
     return {**(own or {}), **slots}
 
 
+def _package(made: Any) -> str:
+    return str(getattr(made, "__module__", "")).partition(".")[0]
+
+
 @lru_cache(maxsize=64)
-def _source(written: Any) -> str:
-    with _PARSING:
-        return inspect.getsource(written)
+def _code(written: Any) -> tuple[str, ...]:
+    """The source of a class or a function, and numbers, texts and functions that it takes from
+    modules of its own package, as they were when it was seen first."""
+    found: list[str] = []
+    waiting = [written]
+    for part in waiting:
+        with suppress(OSError, TypeError), _PARSING:
+            found.append(inspect.getsource(getattr(part, "__code__", part)))
+        if getattr(part, "__name__", "") == "<lambda>":  # several may stand in one line
+            code = part.__code__
+            constants = [c for c in code.co_consts if not inspect.iscode(c)]
+            found.append(f"{code.co_code.hex()} {code.co_names} {constants}")
+        for function in filter(inspect.isfunction, [part, *getattr(part, "__dict__", {}).values()]):
+            with suppress(TypeError, ValueError):
+                for name, value in sorted(inspect.getclosurevars(function).globals.items()):
+                    if isinstance(value, int | float | str | bytes):
+                        found.append(f"{name}={value!r}")
+                    elif inspect.isfunction(value) and _package(value) == _package(written):
+                        waiting += [value] * (value not in waiting)
+    return tuple(found)
 
 
 def _packed(value: Any, known: Known | None, depth: int) -> Any:

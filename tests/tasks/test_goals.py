@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import make_dataclass, replace
 from fractions import Fraction
 from functools import partial
 from types import SimpleNamespace
@@ -21,7 +21,7 @@ from pytest_simbench.scene import Pose
 from pytest_simbench.scene.policy import Command, Observation, as_policy
 from pytest_simbench.tasks import GoalTask, Jitter, PickAndPlace, PushingToGoal, Reaching
 from pytest_simbench.tasks.base import Outcome
-from pytest_simbench.tasks.recorded import digest
+from pytest_simbench.tasks.recorded import digest, recorded
 from tests.conftest import performed
 from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, put
 
@@ -151,6 +151,20 @@ def test_a_record_tells_which_policy_it_was() -> None:
         lambda gain: [{frozenset({gain})}, np.array([Held(gain)])],
     ):  # fmt: skip
         assert digest(Held(held(1.0))) == digest(Held(held(1.0))) != digest(Held(held(2.0)))
+    for text in (
+        "def act(seen): return GAIN", "def far(): return GAIN\ndef act(seen): return far()",
+        "class Base:\n def act(self, seen): return GAIN\nclass Mine(Base): pass\nact = Mine()",
+    ):  # fmt: skip
+
+        def written(gain: float, text: str = text) -> Any:
+            exec(text, space := {"GAIN": gain, "__name__": "mine"})
+            return space["act"]
+
+        assert digest(written(1.0)) == digest(written(1.0)) != digest(written(2.0))
+    quiet, loud = lambda seen: None, lambda seen: 1.0
+    assert digest(quiet) != digest(loud)
+    one, other = (make_dataclass(name, ["gain"], frozen=True)(1.0) for name in ("One", "Other"))
+    assert recorded(one) == recorded(replace(one)) != recorded(other)
     filtered = Held(Held(1.0))
     before = digest(filtered)
     filtered.gain.gain = 2.0  # by acting
