@@ -17,7 +17,6 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.signal import savgol_filter
-from scipy.spatial.transform import Rotation, Slerp
 
 from pytest_simbench.client.world import World
 from pytest_simbench.data import pushes
@@ -31,7 +30,7 @@ from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, FloatArray, Gripper, Joint, Pose, Robot, Scene, Trajectory
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
-from pytest_simbench.tasks.measured import MeasuredTask
+from pytest_simbench.tasks.measured import MeasuredTask, poses_at
 
 CUBE_SIZE, CUBE_MASS = 0.075, 0.0884
 """[m], [kg] (the source)."""
@@ -180,16 +179,11 @@ class ArmPushing(MicoTask):
 
 
 def each_tick(time: FloatArray, states: FloatArray) -> FloatArray:
-    """A body's motion at the times of the recording: a step may not divide these.
-
-    Args:
-        time: of the samples [s], (n,), from 0.
-        states: rows of `Pose.as_array`, (n, 7).
-    """
+    """A body's motion from time 0 [s] on, (n,), rows of `Pose.as_array`, (n, 7), at the times of
+    the recording: a step may not divide these."""
     at = np.minimum(TICK * np.arange(round(time[-1] / TICK) + 1), time[-1])
-    position = [np.interp(at, time, column) for column in states[:, :3].T]
-    turns = Slerp(time, Rotation.from_quat(states[:, 3:], scalar_first=True))(at)
-    return np.column_stack([*position, turns.as_quat(scalar_first=True)])
+    position, turns = poses_at(at, time, states)
+    return np.column_stack([position, turns.as_quat(scalar_first=True)])
 
 
 def compared(moved: FloatArray, real: FloatArray) -> tuple[dict[str, float | None], dict[str, Any]]:

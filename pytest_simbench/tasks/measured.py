@@ -7,7 +7,11 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
 from pytest_simbench.data.measured import Measured, MeasuredMotion
+from pytest_simbench.scene import FloatArray
 from pytest_simbench.tasks.base import Task
 
 M = TypeVar("M", bound=MeasuredMotion)
@@ -53,3 +57,10 @@ class MeasuredTask(Task, Generic[M]):
             name: value.digest if isinstance(value, Measured) else value
             for name, value in told.items()
         }
+
+
+def poses_at(at: FloatArray, time: FloatArray, states: FloatArray) -> tuple[FloatArray, Rotation]:
+    """Positions [m], (m, 3), and turns of a body at times [s], (m,), within those of its states,
+    (n,): position, quaternion w, x, y, z, (n, 7) or wider. Between two it moves evenly."""
+    position = np.stack([np.interp(at, time, column) for column in states[:, :3].T], axis=1)
+    return position, Slerp(time, Rotation.from_quat(states[:, 3:7], scalar_first=True))(at)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.world import World
@@ -22,7 +22,7 @@ from pytest_simbench.data.tosses import Toss, Tosses
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Box, FloatArray, Scene
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
-from pytest_simbench.tasks.measured import MeasuredTask
+from pytest_simbench.tasks.measured import MeasuredTask, poses_at
 
 ACRYLIC = (0.25, 0.45, 0.80, 1.0)
 
@@ -114,8 +114,7 @@ def off(toss: Toss, time: FloatArray, states: FloatArray) -> tuple[FloatArray, F
         distances [m] and angles [rad], each as long as the toss.
     """
     at = np.minimum(toss.time, time[-1])
-    position = np.stack([np.interp(at, time, column) for column in states[:, :3].T], axis=1)
+    position, turned = poses_at(at, time, states)
     distance = np.linalg.norm(position - toss.state[:, :3], axis=1)
-    turned = Slerp(time, Rotation.from_quat(states[:, 3:7], scalar_first=True))(at)
     real = Rotation.from_quat(toss.state[:, 3:7], scalar_first=True)
     return distance, np.asarray((real.inv() * turned).magnitude())
