@@ -215,59 +215,6 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return adjusted
 
 
-@dataclass(frozen=True)
-class Equivalence:
-    """Whether two means differ by less than a margin, by two one-sided tests.
-
-    Attributes:
-        difference, margin: of the means, second - first, and the largest that does not matter.
-        p_value: the larger of the two tests'.
-    """
-
-    difference: float
-    margin: float
-    p_value: float
-
-    def equivalent(self, alpha: float = ALPHA) -> bool:
-        return self.p_value <= alpha
-
-
-def equivalence(first: ArrayLike, second: ArrayLike, margin: float) -> Equivalence:
-    """Two one-sided paired t tests (TOST): "headless and GUI do not differ by more than `margin`".
-
-    Not significantly different is not the same as equivalent: few repetitions show neither. Values
-    that were alike so far say nothing of what is rare: a difference of a whole share in so many of
-    the pairs as the margin says stays unseen in n of them with the probability (1 - margin)^n,
-    below which no p value lies. So pairs that are all equal show a margin of 5 points with 59 of
-    them, of 10 points with 29.
-
-    Args:
-        first, second: values of the same seeds, (n,) each, at least two.
-        margin: above 0.
-
-    Raises:
-        ValueError: fewer than two values on a side, unequal pairs, or a margin that is not above 0.
-    """
-    from scipy import stats
-
-    a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-    if margin <= 0:
-        raise ValueError(f"the margin of an equivalence must be above 0, not {margin:g}")
-    if a.size < 2 or a.size != b.size:
-        raise ValueError(f"equivalence needs two or more pairs, not {a.size} and {b.size} values")
-    difference = float(b.mean() - a.mean())
-    if np.ptp(b - a) <= 1e-12 * max(1.0, float(np.abs(a).max())):
-        room = max(0.0, margin - abs(difference))
-        return Equivalence(difference, margin, max(0.0, 1 - room) ** a.size)
-    unseen = max(0.0, 1 - margin) ** a.size
-    sides: tuple[tuple[FloatArray, Alternative], ...] = (
-        (b + margin, "greater"),
-        (b - margin, "less"),
-    )
-    found = [stats.ttest_rel(side, a, alternative=way).pvalue for side, way in sides]
-    return Equivalence(difference, margin, float(max(*found, unseen)))
-
-
 def alike(first: ArrayLike, second: ArrayLike, margin: float, *, yes_no: bool) -> bool:
     """Whether the means of shares, of the same seeds, (n,) each, differ by less than a margin.
 
@@ -285,6 +232,6 @@ def alike(first: ArrayLike, second: ArrayLike, margin: float, *, yes_no: bool) -
     return max(most(np.maximum(gaps, 0.0)), most(np.maximum(-gaps, 0.0))) < margin
 
 
-def pairs_for_equivalence(margin: float) -> int:
-    """Fewest pairs, all of them equal, that show an equivalence: 59 for 5 points of a share."""
-    return max(2, math.ceil(math.log(ALPHA) / math.log1p(-min(margin, 1 - 1e-9))))
+def fewest_alike(margin: float, *, yes_no: bool) -> int:
+    """Fewest pairs, all of them equal, that show it: 59 of yes or no for 5 points, else 72."""
+    return math.ceil(math.log(ALPHA if yes_no else ALPHA / 2) / math.log1p(-margin))

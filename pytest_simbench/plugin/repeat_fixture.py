@@ -29,7 +29,7 @@ from pytest_simbench.plugin.marks import number
 from pytest_simbench.plugin.run import Run
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.claims import Claim
-from pytest_simbench.records.configuration import text
+from pytest_simbench.records.configuration import task_parameters, text
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record, RecordError, plain
@@ -150,6 +150,7 @@ def claim_of(case: Case, result: ResultSet, metric: Metric, judgement: Judgement
         crashed=len(result.crashed),
         without=result.without(metric),
         advice=judgement.advice,
+        parameters=task_parameters(result.records[0]),
     )
 
 

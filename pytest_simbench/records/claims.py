@@ -24,6 +24,7 @@ class Claim(FolderLine):
             empty where the test as a whole failed.
         metric, relation, threshold: what was claimed of which metric; empty where the test as a
             whole failed.
+        parameters: of the task, as `configuration.task_parameters` tells them.
         number: of claims of one test that are alike in task, metric and relation, from 0.
         verdict: what the repetitions say of it.
         mean, low, high: what was measured, and the bounds that decided; None where there are none.
@@ -50,6 +51,7 @@ class Claim(FolderLine):
     crashed: Count = 0
     without: Count = 0
     advice: str = ""
+    parameters: str = ""
     number: Count = 0
 
     @property

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from copy import copy, deepcopy
 from dataclasses import dataclass, fields, replace
@@ -146,26 +146,33 @@ class GoalTask(Task):
         success = self.reached(world, seed)
         count(int(success), 1)
         metrics = {"success": float(success), "distance": self.distance(world, seed)}
-        ended = acted - HELD if success and acted < self.seconds - 1e-6 else None
+        early = success and acted < self.seconds - 1e-6
+        ended = stayed.since - began if early and stayed.since is not None else None
         return Outcome(
             {**metrics, "time": ended},
             {"goal": [*self.goal(seed).position], "acted": acted},
             reasons=() if success else (f"{self.moved or 'tool'} not at its goal",),
         )
 
-    def stays(self, seed: int) -> Callable[[Observation], bool]:
+    def stays(self, seed: int) -> Stays:
         """Whether what is moved has been at the goal for long enough, asked again and again."""
-        since: float | None = None
+        return Stays(self, seed)
 
-        def stays(seen: Observation) -> bool:
-            nonlocal since
-            if not self.reached(seen, seed):
-                since = None
-            elif since is None:
-                since = seen.time
-            return since is not None and seen.time - since >= HELD - 1e-9
 
-        return stays
+@dataclass
+class Stays:
+    """Tells it of each observation; `since` is the time [s] of the first one of the stay."""
+
+    task: GoalTask
+    seed: int
+    since: float | None = None
+
+    def __call__(self, seen: Observation) -> bool:
+        if not self.task.reached(seen, self.seed):
+            self.since = None
+        elif self.since is None:
+            self.since = seen.time
+        return self.since is not None and seen.time - self.since >= HELD - 1e-9
 
 
 @dataclass(frozen=True)

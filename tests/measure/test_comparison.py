@@ -13,14 +13,12 @@ from scipy.stats import chi2, chi2_contingency
 
 from pytest_simbench.measure import comparison
 from pytest_simbench.measure.comparison import (
-    Equivalence,
     alike,
     compare,
     compare_by_seed,
-    equivalence,
+    fewest_alike,
     holm,
     pair,
-    pairs_for_equivalence,
 )
 
 EXPERIMENTS = 400
@@ -142,9 +140,6 @@ NOTHING = "nothing to compare: a side has no repetitions"
         (lambda: compare([1.0], []), NOTHING),
         (lambda: compare([1.0], [1.0, 2.0], paired=True),
          "pairs need as many values on each side, not 1 and 2"),
-        (lambda: equivalence([1.0, 2.0], [1.0, 2.0], 0.0), "margin of an .* must be above 0"),
-        (lambda: equivalence([1.0], [1.0], 0.1), "two or more pairs, not 1 and 1 values"),
-        (lambda: equivalence([1.0, 2.0], [1.0] * 3, 0.1), "two or more pairs, not 2 and 3 values"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_judged_is_refused(judge: Callable[[], Any], message: str) -> None:
@@ -180,8 +175,6 @@ def test_a_significant_p_value_is_at_most_alpha() -> None:
     found = compare([1, 2, 3], [4, 5, 6], alternative="greater")
     assert found.significant(found.p_value)
     assert not found.significant(found.p_value - 1e-9)
-    assert Equivalence(0.0, 1.0, 0.2).equivalent(0.2)
-    assert not Equivalence(0.0, 1.0, 0.2).equivalent(0.19)
 
 
 def test_holm_agrees_with_a_worked_example() -> None:
@@ -198,16 +191,6 @@ def test_holm_keeps_the_order_and_never_lowers(p_values: list[float]) -> None:
     assert [adjusted[k] for k in ranks] == sorted(adjusted)
 
 
-def test_equivalence_alarms_in_one_of_twenty_at_its_margin() -> None:
-    """A true difference of just the margin must not be called equivalent."""
-    rng = np.random.default_rng(13)
-    claimed = sum(
-        equivalence(rng.normal(0, 1, 20), rng.normal(1.5, 1, 20), 1.5).equivalent()
-        for _ in range(EXPERIMENTS)
-    )
-    assert 0.05 - SAMPLING <= claimed / EXPERIMENTS <= 0.05 + SAMPLING
-
-
 @pytest.mark.parametrize(("n", "yes_no"), [(60, True), (90, True), (200, True), (90, False)])
 def test_shares_are_alike_in_one_of_twenty_at_the_margin(n: int, yes_no: bool) -> None:
     """A t test said so in 12 to 20 of 100 where one repetition in twenty is lost."""
@@ -219,50 +202,14 @@ def test_shares_are_alike_in_one_of_twenty_at_the_margin(n: int, yes_no: bool) -
     assert alike(np.ones(n), rare, 0.05, yes_no=False) == (n == 200)
 
 
-def test_equivalence_is_not_the_lack_of_a_difference() -> None:
-    rng = np.random.default_rng(14)
-    few, many = rng.normal(0, 1, (2, 5)), rng.normal(0, 1, (2, 200))
-    assert not compare(*few).significant()
-    assert not equivalence(*few, 0.5).equivalent()
-    assert equivalence(*many, 0.5).equivalent()
-
-
 @pytest.mark.parametrize(
-    ("n", "margin", "shift", "equivalent"),
-    [
-        (2, 0.05, 0.0, False), (58, 0.05, 0.0, False), (59, 0.05, 0.0, True),
-        (28, 0.1, 0.0, False), (29, 0.1, 0.0, True),
-        (59, 0.1, 0.05, True), (59, 0.1, 0.06, False), (400, 0.1, 0.1, False),
-        (400, 0.1, -0.2, False),
-    ],
-)  # fmt: skip
-def test_alike_so_far_is_bounded_by_what_is_rare(
-    n: int, margin: float, shift: float, equivalent: bool
-) -> None:
+    ("yes_no", "margin", "fewest"), [(True, 0.05, 59), (True, 0.1, 29), (False, 0.05, 72)]
+)
+def test_alike_so_far_is_bounded_by_what_is_rare(yes_no: bool, margin: float, fewest: int) -> None:
     """Without a loss in n, a loss of everything in so many is left: 0.05^(1/n)."""
-    first = np.linspace(0.4, 0.6, n)
-    found = equivalence(first, first + shift, margin)
-    assert found.equivalent() is equivalent
-    assert found.difference == pytest.approx(shift)
-    assert pairs_for_equivalence(0.05) == 59
-    assert pairs_for_equivalence(0.1) == 29
-    assert equivalence([1, 1], [1, 1], 0.05).p_value == pytest.approx(0.95**2)
-
-
-def test_equivalence_is_two_paired_t_tests_of_enough_pairs() -> None:
-    """The worse of both; also where each pair's sum is always the same."""
-    from scipy.stats import ttest_rel
-
-    first = np.array([0.1, 0.2, 0.3, 0.45])
-    for second in (0.5 - first, first[::-1] + 0.02, np.full(4, 0.25)):
-        for margin in (0.05, 0.3):
-            found = equivalence(first, second, margin)
-            ways = (margin, "greater"), (-margin, "less")
-            tests = [ttest_rel(second + side, first, alternative=way) for side, way in ways]
-            worse = max(test.pvalue for test in tests)
-            assert found.p_value == pytest.approx(max(worse, (1 - margin) ** 4))
-            assert found.difference == pytest.approx(second.mean() - first.mean())
-            assert found.margin == margin
+    assert fewest_alike(margin, yes_no=yes_no) == fewest
+    for n in (2, fewest - 1, fewest):
+        assert alike(np.ones(n), np.ones(n), margin, yes_no=yes_no) == (n == fewest)
 
 
 def rare(rng: np.random.Generator, n: int) -> Any:

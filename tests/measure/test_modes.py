@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pytest_simbench.measure.comparison import equivalence
 from pytest_simbench.measure.modes import MARGIN, compare_modes
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
@@ -31,8 +30,8 @@ def compared(headless: list[float], gui: list[float]) -> str:
 
 def test_bit_identical_modes_are_the_same() -> None:
     """As many as bound a loss that was never seen below the margin."""
-    found = compared([1.0, 0.8, 1.0] * 20, [1.0, 0.8, 1.0] * 20)
-    assert "the same within 5 points (gui +0 points, 60 common seeds)" in found
+    found = compared([1.0, 0.8, 1.0] * 24, [1.0, 0.8, 1.0] * 24)
+    assert "the same within 5 points (gui +0 points, 72 common seeds)" in found
 
 
 def test_a_single_mode_is_not_compared() -> None:
@@ -45,8 +44,8 @@ def test_error_rates(true: float, low: float, high: float) -> None:
     rng = np.random.default_rng(7)
     claims = 0
     for _ in range(300):
-        headless = rng.normal(0.8, 0.05, 60)
-        told = compared(list(headless), list(headless - true + rng.normal(0, 0.05, 60)))
+        headless = rng.normal(0.8, 0.05, 200)
+        told = compared(list(headless), list(headless - true + rng.normal(0, 0.05, 200)))
         claims += ": the same within 5 points (" in told
     assert low <= claims / 300 <= high
 
@@ -54,12 +53,11 @@ def test_error_rates(true: float, low: float, high: float) -> None:
 def test_each_sentence_word_by_word() -> None:
     name = "mujoco, headless and gui, placed"
     assert compared([1.0, 0.8, 1.0], [1.0, 0.8, 1.0]) == (
-        f"{name}: gui +0 points, 3 common seeds; the same within 5 points takes 59 or more."
+        f"{name}: gui +0 points, 3 common seeds; the same within 5 points takes 72 or more."
     )
     headless, gui = [1.0, 0.5, 0.75, 0.5], [0.75, 0.5, 0.5, 0.25]
     assert compared(headless, gui) == (
-        f"{name}: not shown to be the same within 5 points (gui -18.8 points, 4 common seeds, "
-        f"p = {equivalence(headless, gui, MARGIN).p_value:.2g})."
+        f"{name}: not shown to be the same within 5 points (gui -18.8 points, 4 common seeds)."
     )
     assert compared([1.0], [1.0]) == f"{name}: too few common seeds to compare."
 

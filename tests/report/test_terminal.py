@@ -152,3 +152,10 @@ def test_a_table_too_wide_is_cut_by_group_and_its_rows_named_again() -> None:
         Column("second", ["3", "4"], "y"),
     ]
     assert_approved("terminal-cut", render(columns, 14))
+
+
+def test_a_name_that_is_too_wide_beside_one_column_is_wrapped_and_nothing_is_cut() -> None:
+    columns = [Column("name", ["a long name"], left=True), Column("value", ["0.12 [0.1, 0.2]"])]
+    lines = render(columns, 24).splitlines()
+    assert [line.split("  ")[0].strip() for line in lines[2:]] == ["a long", "name"]
+    assert lines[2].endswith("0.12 [0.1, 0.2]")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.records.claims import Claim
+from pytest_simbench.records.configuration import task_parameters
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import COSTS, CRASHED, Metric, significant
 from pytest_simbench.records.record import Record
@@ -225,13 +226,14 @@ def _trouble(told: _Told, records: Sequence[Record]) -> Trouble:
         return Trouble(f"{test}: {claim.advice}", "", command(worst) if worst else "")
     many = f", {claim.crashed} crashed" if claim.crashed else ""
     what = f"{test}: {told.claimed} is {told.value} over {claim.n} repetitions{many}{told.without}"
-    own = [record for record in records if record.task == claim.task]
+    known = [record for record in records if record.task == claim.task]
+    own = [r for r in known if claim.parameters in ("", task_parameters(r))]
     worst = next((record for record in crashed if record in own), None)
     why = f"crashed: {worst.error.cause}" if worst and worst.error else ""
-    known = [] if metric is None else [(v, r) for r in own if (v := r.value(metric)) is not None]
-    if worst is None and metric is not None and known:
+    if worst is None and metric is not None:
         pick = min if claim.relation == "at least" else max
-        value, worst = pick(known, key=lambda pair: pair[0])
+        told_of = [(v, r) for r in own if (v := r.value(metric)) is not None]
+        value, worst = pick(told_of, key=lambda pair: pair[0], default=(0.0, None))
         why = f"has {metric.format(value)}"
     if worst is None:
         return Trouble(what)

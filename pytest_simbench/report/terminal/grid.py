@@ -89,7 +89,14 @@ def _below(columns: Sequence[Column], width: int) -> str:
 
 def _best(columns: Sequence[Column], width: int) -> str:
     single = [column.joined() for column in columns]
-    return _draw(single if fits(single, width) else columns, width)
+    if fits(single, width):
+        return _draw(single, width)
+    label = (
+        columns[0]
+        if fits(columns, width)
+        else replace(columns[0], content=columns[0].cells, wrap=True)
+    )
+    return _draw([label, *columns[1:]], width)
 
 
 def _lines(column: Column) -> list[str]:

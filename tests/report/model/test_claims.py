@@ -102,6 +102,14 @@ def test_a_claim_that_fails_names_the_worst_repetition_and_how_to_see_it_again()
     assert "--sim-name=drake" in trouble.again
 
 
+def test_the_worst_repetition_is_one_of_the_claims_own_task() -> None:
+    """Another task of the same test, with other parameters, has a repetition that is worse."""
+    other = replace(RECORDS[3], settings={"task.height": 2}, seed=7, metrics={"placed": 0.0})
+    mine = replace(FAILED, parameters="{}")
+    (trouble,) = claims_of(reading(mine, records=(*RECORDS, other))).troubles
+    assert trouble.worst == "seed 1002, repetition 2 has 20 %"
+
+
 def test_repetitions_without_a_value_are_told() -> None:
     found = claims_of(reading(claim(n=6, without=6), replace(FAILED, without=1)))
     assert found.table.columns[1].cells[0].text == "PASS 100, 6 without a value"
