@@ -154,8 +154,17 @@ def test_a_table_too_wide_is_cut_by_group_and_its_rows_named_again() -> None:
     assert_approved("terminal-cut", render(columns, 14))
 
 
-def test_a_name_that_is_too_wide_beside_one_column_is_wrapped_and_nothing_is_cut() -> None:
-    columns = [Column("name", ["a long name"], left=True), Column("value", ["0.12 [0.1, 0.2]"])]
-    lines = render(columns, 24).splitlines()
-    assert [line.split("  ")[0].strip() for line in lines[2:]] == ["a long", "name"]
-    assert lines[2].endswith("0.12 [0.1, 0.2]")
+def test_a_table_too_wide_below_its_names_is_told_apart_and_nothing_is_cut() -> None:
+    columns = [
+        Column("test", ["a", "a", "b"], left=True, above=True),
+        Column("metric", ["placed", "hit", "hit"], left=True),
+        Column("value", ["0.12 [0.1, 0.2]"] * 3),
+        Column("verdict", ["worse by far"] * 3, left=True, wrap=True),
+    ]
+    lines = [line.split() for line in render(columns, 24).splitlines() if line]
+    value, verdict = ["0.12", "[0.1,", "0.2]"], ["worse", "by", "far"]
+    assert [line for line in lines if line[0][0] != "-"] == [
+        ["a"], ["metric", "value"], ["placed", *value], ["hit", *value],
+        ["metric", "verdict"], ["placed", *verdict], ["hit", *verdict],
+        ["b"], ["metric", "value"], ["hit", *value], ["metric", "verdict"], ["hit", *verdict],
+    ]  # fmt: skip

@@ -6,6 +6,7 @@ import io
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import groupby
 
 from rich.box import Box
 from rich.cells import cell_len
@@ -30,15 +31,19 @@ def render(columns: Sequence[Column], width: int) -> str:
     """The table in `width` columns: the first column names the rows.
 
     Tried in this order: one line for each row; the first column's cells on lines of their own, if
-    they may stand there; cells of several lines; one table for each group of columns; as many
-    tables as it takes. Lines have no trailing blanks.
+    they may stand there; a table below each of those; cells of several lines; one table for each
+    group of columns; as many tables as it takes. Lines have no trailing blanks.
     """
     single = [column.joined() for column in columns]
     if fits(single, width):
         return _draw(single, width)
     if columns[0].above and fits_below(single, width):
         return _below(single, width)
-    if any(column.wrap for column in columns):
+    kept = [column for column in single if not column.wrap]
+    cut = any(_width(column) > width for column in kept)  # however it is laid out
+    if columns[0].above and not cut:
+        return "\n\n".join(_apart(single, width))
+    if len(kept) < len(single) and (cut or fits(kept, width - NARROWEST)):
         return _draw(single, width)
     if fits(columns, width):
         return _draw(columns, width)
@@ -87,16 +92,18 @@ def _below(columns: Sequence[Column], width: int) -> str:
     return "\n".join(" " * GAP + line if line else next(above) for line in lines)
 
 
+def _apart(columns: Sequence[Column], width: int) -> Iterator[str]:
+    """A table for each run of rows that share the first column's cell, which stands above it."""
+    label, *rest = columns
+    for head, found in groupby(enumerate(label.cells), lambda row: row[1].text):
+        rows = [k for k, _ in found]
+        of = [replace(column, content=[column.cells[k] for k in rows]) for column in rest]
+        yield f"{fill(head, width, '  ')}\n{render(of, width)}"
+
+
 def _best(columns: Sequence[Column], width: int) -> str:
     single = [column.joined() for column in columns]
-    if fits(single, width):
-        return _draw(single, width)
-    label = (
-        columns[0]
-        if fits(columns, width)
-        else replace(columns[0], content=columns[0].cells, wrap=True)
-    )
-    return _draw([label, *columns[1:]], width)
+    return _draw(single if fits(single, width) else columns, width)
 
 
 def _lines(column: Column) -> list[str]:
