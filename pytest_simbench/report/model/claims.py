@@ -29,6 +29,8 @@ Metrics = Mapping[str, Sequence[Metric]]
 
 NO_CLAIM = "no claim was judged"
 
+OPEN = "the run was resumed and did not end: resume it again"
+
 ONE_SIDED = "A claim has one side, and so have its bounds: those of other tables are wider."
 
 
@@ -125,7 +127,8 @@ def claims_of(reading: RunContents, comparison: GateReport | None = None) -> Cla
     troubles = [Trouble(text) for text in failures]
     troubles += [_trouble(one, of_test.get(one.claim.test, [])) for one in fails]
     for (subject, claimed), same in grouped(undecided, lambda t: (t.subject, t.claimed)).items():
-        found = [f"{one.claim.simulator} {one.value} ({one.claim.advice})" for one in same]
+        of = [(f"{one.claim.simulator} {one.value}".rstrip(), one.claim.advice) for one in same]
+        found = [f"{value} ({advice})" for value, advice in of]
         troubles.append(Trouble(f"UNDECIDED {subject}: {claimed}: {'; '.join(found)}"))
     more = max(0, len(troubles) - MOST)
     sentence = _sentence(state, count, reading.records)
@@ -153,9 +156,15 @@ def _name(claim: Claim) -> str:
 def _that_count(found: Sequence[Claim], crashed: Collection[str]) -> list[Claim]:
     """The last of each; of a test as a whole, only that it failed and no claim of it says why. What
     failed counts no more where the resumed test passed as a whole, nor what an earlier attempt of
-    a test said of crashes where its last one has none."""
+    a test said of crashes where its last one has none. What was taken back stands open until its
+    test is judged again."""
     last_of = {claim.identity: claim for claim in found}
-    every = [claim for claim in last_of.values() if claim.verdict]
+    judged = {claim.test for claim in last_of.values() if claim.verdict}
+    every = [
+        claim if claim.verdict else replace(claim, verdict="UNDECIDED", advice=OPEN, mean=None)
+        for claim in last_of.values()
+        if claim.verdict or claim.test not in judged
+    ]
     passed = {claim.test for claim in every if not claim.metric and claim.verdict == "PASS"}
     last = [
         claim

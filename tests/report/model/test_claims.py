@@ -13,7 +13,7 @@ from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Failure
 from pytest_simbench.report.markdown.run import render_claims
-from pytest_simbench.report.model.claims import claims_of
+from pytest_simbench.report.model.claims import OPEN, claims_of
 from pytest_simbench.report.terminal.parts import claim_lines
 from tests.report.samples import METRICS, record
 
@@ -183,6 +183,16 @@ def test_markdown_opens_with_the_same() -> None:
     )
     assert "| claim | mujoco | drake |" in text
     assert "again: `pytest 'suites/test_stacking.py::test_stacking[drake-headless]'" in text
+
+
+def test_a_claim_that_was_taken_back_stands_open_until_its_test_is_judged_again() -> None:
+    """It held no more, so a run that had failed, was resumed and cut short opened with PASS."""
+    back = replace(FAILED, verdict="")
+    found = claims_of(reading(claim(), FAILED, back))
+    assert found.state == "UNDECIDED"
+    assert found.troubles[0].what == f"UNDECIDED test_stacking: placed >= 90 %: drake ({OPEN})"
+    other = replace(FAILED, metric="placed_strict", verdict="PASS")
+    assert claims_of(reading(claim(), FAILED, back, other)).state == "PASS"
 
 
 def test_a_claim_that_is_not_decided_on_several_simulators_is_told_once() -> None:
