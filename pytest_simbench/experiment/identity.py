@@ -26,6 +26,7 @@ from pytest_simbench.records.series import short
 from pytest_simbench.scene import MotionLimits, Pose, Robot
 from pytest_simbench.simulator.registry import adapter, address, settings_of
 from pytest_simbench.tasks.base import Jitter, Task
+from pytest_simbench.tasks.recorded import code_of
 
 
 def record_of(
@@ -57,6 +58,7 @@ def record_of(
         settings={**settings, **experiment.task.parameters()},
         versions={"pytest-simbench": __version__, **versions},
         scene=scene_digest(experiment.task),
+        code=code_of(experiment.task),
         robot=describe_robot(experiment.robot),
         limits=experiment.limits,
         contended=case.contended,

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import json
 import re
 import sys
 import weakref
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from functools import lru_cache, partial
@@ -80,16 +81,32 @@ def digest(policy: Any, known: Known | None = None, depth: int = DEPTH) -> str:
     with suppress(TypeError, ValueError):
         held |= inspect.getclosurevars(made).nonlocals
         held |= {"defaults": made.__defaults__, "keywords": made.__kwdefaults__}
-    written: Any = inspect.unwrap(made) if inspect.isroutine(made) else type(made)
-    for part in written.__mro__ if isinstance(written, type) else [written]:
-        if part is written or _package(part) not in {_package(recorded), *sys.stdlib_module_names}:
-            text += _code(part)
+    text += _source(inspect.unwrap(made) if inspect.isroutine(made) else type(made))
     if not hasattr(made, "__dict__"):  # a date, say
         text.append(re.sub("( at)? 0x[0-9a-fA-F]+", "", repr(made)))
     for name, value in sorted(held.items()):
         if value is not None:
             text.append(f"{name}={_packed(value, known, depth)!r}")
+    return _short(text)
+
+
+def code_of(task: Any) -> str:
+    """A digest of a task's source; empty for one of this package, whose version says it."""
+    kind = type(task)
+    return "" if _package(kind) == _package(recorded) else _short(_source(kind))
+
+
+def _short(text: Iterable[str]) -> str:
     return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]
+
+
+def _source(written: Any) -> list[str]:
+    """Of a class, with those that it inherits from and that come with neither Python nor this
+    package, or of a function."""
+    known = {_package(recorded), *sys.stdlib_module_names}
+    parts = written.__mro__ if isinstance(written, type) else [written]
+    of = [part for part in parts if part is written or _package(part) not in known]
+    return [line for part in of for line in _code(part)]
 
 
 def _at_first(value: Any) -> str:
@@ -114,8 +131,8 @@ def _package(made: Any) -> str:
 
 @lru_cache(maxsize=64)
 def _code(written: Any) -> tuple[str, ...]:
-    """The source of a class or a function, and numbers, texts and functions that it takes from
-    modules of its own package, as they were when it was seen first."""
+    """The source of a class or a function, and numbers, texts, rows of them and functions that it
+    takes from modules of its own package, as they were when it was seen first."""
     found: list[str] = []
     waiting = [written]
     for part in waiting:
@@ -130,6 +147,9 @@ def _code(written: Any) -> tuple[str, ...]:
                 for name, value in sorted(inspect.getclosurevars(function).globals.items()):
                     if isinstance(value, int | float | str | bytes):
                         found.append(f"{name}={value!r}")
+                    elif isinstance(value, tuple | list | dict):
+                        with suppress(TypeError, ValueError):  # it holds objects
+                            found.append(f"{name}={json.dumps(value)}")
                     elif inspect.isfunction(value) and _package(value) == _package(written):
                         waiting += [value] * (value not in waiting)
     return tuple(found)

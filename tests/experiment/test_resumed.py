@@ -76,7 +76,7 @@ def test_a_complete_run_is_held_against_the_options_without_a_worker(
         save(*before).take(Experiment(replace(case, **now), Falling()), None)
 
 
-def test_the_tasks_parameters_and_scene_are_compared(case: Case, save: Save) -> None:
+def test_the_tasks_parameters_scene_and_code_are_compared(case: Case, save: Save) -> None:
     resumed = save(*ended(case, Falling(), 1))
     with pytest.raises(NotResumed, match=r"settings.task.duration was 0.6, is 9.0"):
         resumed.take(Experiment(case, Falling(duration=9.0)), None)
@@ -84,10 +84,11 @@ def test_the_tasks_parameters_and_scene_are_compared(case: Case, save: Save) -> 
     resumed.tasks["falling"] = TaskDescription("falling", (replace(landed, unit="mm"),))
     with pytest.raises(NotResumed, match="unit of the metric landed of falling was "):
         resumed.take(Experiment(case, Falling()), None)
-    with pytest.raises(NotResumed, match=r"scene was "):
-        save(*ended(case, Falling(), 2, scene="of another task")).take(
-            Experiment(case, Falling()), None
-        )
+    for name in ("scene", "code"):
+        with pytest.raises(NotResumed, match=f"{name} was "):
+            save(*ended(case, Falling(), 2, **{name: "of another task"})).take(
+                Experiment(case, Falling()), None
+            )
 
 
 @pytest.mark.engine
@@ -181,7 +182,7 @@ def test_each_attempt_gets_its_own(case: Case, save: Save) -> None:
 
 
 def test_records_of_before_scene_and_limits_were_kept_go_on(case: Case, save: Save) -> None:
-    old = ended(case, Falling(), 1, scene="", limits={})
+    old = ended(case, Falling(), 1, scene="", code="", limits={})
     assert len(save(*old).take(Experiment(case, Falling()), None)) == 1
 
 

@@ -21,7 +21,7 @@ from pytest_simbench.scene import Pose
 from pytest_simbench.scene.policy import Command, Observation, as_policy
 from pytest_simbench.tasks import GoalTask, Jitter, PickAndPlace, PushingToGoal, Reaching
 from pytest_simbench.tasks.base import Outcome
-from pytest_simbench.tasks.recorded import digest, recorded
+from pytest_simbench.tasks.recorded import code_of, digest, recorded
 from tests.conftest import performed
 from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, put
 
@@ -154,10 +154,11 @@ def test_a_record_tells_which_policy_it_was() -> None:
     for text in (
         "def act(seen): return GAIN", "def far(): return GAIN\ndef act(seen): return far()",
         "class Base:\n def act(self, seen): return GAIN\nclass Mine(Base): pass\nact = Mine()",
+        "def act(seen): return ROWS[0]",
     ):  # fmt: skip
 
         def written(gain: float, text: str = text) -> Any:
-            exec(text, space := {"GAIN": gain, "__name__": "mine"})
+            exec(text, space := {"GAIN": gain, "ROWS": [{"a": gain}], "__name__": "mine"})
             return space["act"]
 
         assert digest(written(1.0)) == digest(written(1.0)) != digest(written(2.0))
@@ -251,3 +252,10 @@ def test_what_a_policy_gathers_in_one_repetition_is_not_in_the_next(case: Case) 
     record = performed(case, Reaching(policy, seconds=0.2, rate=10.0))
     assert [*policy.rows, *policy.sum] == [0.0, 0.0]
     assert record.settings["task.policy_digest"] == digest(Gathering())
+
+
+def test_the_code_of_a_task_of_ours_is_its_version() -> None:
+    """Another one's is told: what it counts may change between a run and its resumption."""
+    mine = make_dataclass("Mine", [], bases=(Reaching,), frozen=True)
+    assert code_of(Reaching(limp)) == ""
+    assert code_of(mine(limp)) == code_of(mine(to_the_goal)) != ""
