@@ -67,8 +67,7 @@ class Run:
 
     @cached_property
     def _report(self) -> Report:
-        outcome = RunOutcome.read(self.folder)[0]
-        return Report.of(self.contents, outcome.compared, outcome.looks)
+        return Report.of(self.contents, RunOutcome.read(self.folder)[0])
 
     @property
     def records(self) -> Any:

@@ -211,7 +211,7 @@ def _show(
 ) -> Written:
     """Write the report of a run into `target`, the badge into the file `badge`, and with `record`
     recordings of the motions, where they are wanted; and print tables and problems."""
-    report = Report.of(reading, outcome.compared, outcome.looks)
+    report = Report.of(reading, outcome)
     written = Written(**vars(report)) if target is None else write_files(target, report, run)
     lost = write_badge(Path(badge), reading.records, outcome.passed) if badge else ""
     problems += [*written.problems, lost]

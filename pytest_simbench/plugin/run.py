@@ -311,7 +311,9 @@ class Run:
         made = runs.recordings(path, path, records, self.progress) if wanted else ([], True)
         found = comparison.found if comparison else None
         looks = looks_at(path, self.resumed.records if self.resumed else (), records)
-        written = write_files(path, Report.of(self.reading, found, looks))
+        passed = passed and not self.failing
+        outcome = RunOutcome(passed, found, looks)
+        written = write_files(path, Report.of(self.reading, outcome))
         unsaved = self.folder.flush()
         problems = [*self.told, *self.reading.problems, *self.reading.refused]
         problems += [*written.problems, cluster.lost_nodes(records)]
@@ -327,8 +329,7 @@ class Run:
         for title, text in runs.sections(here, reporter._tw.fullwidth, verbose):
             reporter.write_sep("=", title)
             reporter.write_line(text)
-        passed = passed and not self.failing
-        lost = [write_outcome(path, RunOutcome(passed, found, looks))]
+        lost = [write_outcome(path, outcome)]
         if badge := options.value(self.config, "sim_badge"):
             lost.append(write_badge(Path(badge), records, passed))
         whole = written.complete and made[1] and not unsaved

@@ -143,7 +143,7 @@ def report(run: Path) -> None:
     """What `--sim-report` and a comparison do, but for drawing."""
     reading = _read(run)
     outcome, wrong = RunOutcome.read(run)
-    told_of = Report.of(reading, outcome.compared)
+    told_of = Report.of(reading, outcome)
     found = told_of.records
     written = write_files(run, told_of, figures=False)
     tables, problems = write_tables(run, run)

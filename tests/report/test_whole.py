@@ -163,7 +163,7 @@ def test_a_whole_report(
     write_outcome(tmp_path, outcome)
     folder.close()
     reading = RunFolder(tmp_path).read()
-    report = Report.of(reading, outcome.compared, outcome.looks)
+    report = Report.of(reading, outcome)
     written = write_files(tmp_path, report)
     shown = json.dumps(page(tmp_path, report), indent=1, default=plain, ensure_ascii=False)
     known = [

@@ -112,8 +112,11 @@ class _Told:
         return f", {self.claim.without} without a value" if self.claim.without else ""
 
 
-def claims_of(reading: RunContents, comparison: GateReport | None = None) -> Claims:
-    """Of a run, with the limits against its baseline."""
+def claims_of(
+    reading: RunContents, comparison: GateReport | None = None, passed: bool | None = None
+) -> Claims:
+    """Of a run, with the limits against its baseline, and whether pytest passed it if that is
+    known: a test may be lost with its process, and one that never ran claims nothing."""
     of_test = grouped(reading.records, lambda r: r.test)
     crashed = {test for test, of in of_test.items() if any(r.status == "failed" for r in of)}
     claims = _that_count(reading.claims, crashed)
@@ -121,7 +124,8 @@ def claims_of(reading: RunContents, comparison: GateReport | None = None) -> Cla
     failures = comparison.failures if comparison else ()
     count = Counter[str](claim.verdict for claim in claims)
     count["FAIL"] += len(failures)
-    state = next((verdict for verdict in ORDER if count[verdict]), "")
+    rest = passed is False and not count["FAIL"]
+    state = "FAIL" if rest else next((verdict for verdict in ORDER if count[verdict]), "")
     fails = [one for one in told if one.claim.verdict == "FAIL"]
     undecided = [one for one in told if one.claim.verdict == "UNDECIDED"]
     troubles = [Trouble(text) for text in failures]
@@ -131,7 +135,7 @@ def claims_of(reading: RunContents, comparison: GateReport | None = None) -> Cla
         found = [f"{value} ({advice})" for value, advice in of]
         troubles.append(Trouble(f"UNDECIDED {subject}: {claimed}: {'; '.join(found)}"))
     more = max(0, len(troubles) - MOST)
-    sentence = _sentence(state, count, reading.records)
+    sentence = _sentence(state, count, reading.records, rest)
     return Claims(state, sentence, _table(told), troubles[:MOST], more)
 
 
@@ -180,16 +184,17 @@ def _that_count(found: Sequence[Claim], crashed: Collection[str]) -> list[Claim]
     ]
 
 
-def _sentence(state: str, count: Counter[str], records: Sequence[Record]) -> str:
+def _sentence(state: str, count: Counter[str], records: Sequence[Record], rest: bool) -> str:
     ended = [record for record in records if record.status != "interrupted"]
     crashed = sum(record.status == "failed" for record in ended)
     cut = len(records) - len(ended)
     repetitions = f"{crashed} of {len(ended)} repetitions crashed" + f", {cut} cut short" * bool(
         cut
     )
-    if not state:
-        return f"{NO_CLAIM}; {repetitions}"
+    repetitions = "tests failed or did not run; " * rest + repetitions
     total = sum(count.values())
+    if not total:
+        return f"{state}   {NO_CLAIM}; {repetitions}".lstrip()
     parts = [f"{count['FAIL']} of {total} claims fail" if count["FAIL"] else f"{total} claims"]
     if not count["FAIL"]:
         parts = [f"{count['PASS']} of {total} claims hold"]

@@ -15,7 +15,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.report.model import settling, sweep, tables, transfer, truth
 from pytest_simbench.report.model.claims import Claims, claims_of
 from pytest_simbench.report.model.document import Section
-from pytest_simbench.report.model.outcome import Compared
+from pytest_simbench.report.model.outcome import Compared, RunOutcome
 from pytest_simbench.report.model.summary import TaskSummary, at_own_steps, summarise
 
 
@@ -44,22 +44,24 @@ class Report:
     comparison: Compared | None = None
 
     @classmethod
-    def of(cls, reading: RunContents, comparison: Compared | None = None, looks: int = 1) -> Report:
-        """What a run folder holds, that was judged so often (`outcome.Outcome`)."""
+    def of(cls, reading: RunContents, outcome: RunOutcome | None = None) -> Report:
+        """What a run folder holds, and how the run ended."""
         # However many processes wrote them.
         records = sorted(reading.records, key=lambda r: (r.test, r.repetition))
         # A scene that is left to itself has a section that holds its releases against its noise.
         tests = [record for record in reading.records if record.task != SETTLING]
+        outcome = outcome or RunOutcome()
+        compared = outcome.compared
         found = summarise(at_own_steps(records), reading.metrics, reading.references)
         return cls(
-            [replace(summary, looks=looks) for summary in found],
+            [replace(summary, looks=outcome.looks) for summary in found],
             records,
             [*histories(tests, reading.metrics), *law_histories(reading.records)],
             sweeps(reading.records, reading.metrics),
             settlings(reading.records),
             transfers(records),
-            claims_of(reading, comparison[1] if comparison else None),
-            comparison,
+            claims_of(reading, compared[1] if compared else None, outcome.passed),
+            compared,
         )
 
     @property

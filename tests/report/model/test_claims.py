@@ -70,6 +70,17 @@ def test_the_first_line_says_pass_or_fail_and_how_many_crashed() -> None:
         assert claims_of(reading(*claims)).sentence.startswith(sentence)
 
 
+def test_a_run_that_did_not_pass_does_not_open_with_pass() -> None:
+    """A test was lost with its process, or Ctrl-C came before it."""
+    for claims, told in (
+        ((claim(),), "FAIL   1 of 1 claims hold; tests failed or did not run; 0 of 4 repetitions"),
+        ((), "FAIL   no claim was judged; tests failed or did not run; 0 of 4 repetitions"),
+        ((FAILED,), "FAIL   1 of 1 claims fail; 0 of 4 repetitions"),
+    ):
+        found = claims_of(reading(*claims), passed=False)
+        assert (found.state, found.sentence.startswith(told)) == ("FAIL", True)
+
+
 def test_tests_of_one_name_are_told_apart() -> None:
     names = (STACK, STACK.replace("::", "::TestTall::"))
     both = [claim(test=f"{name}[mujoco-headless]", function=name) for name in names]
