@@ -62,7 +62,7 @@ class RobotModel:
     @property
     def reach(self) -> float:
         """How far the tool can be from the axis of the first joint at most [m]: the lengths from
-        joint to joint, and to the tool frame."""
+        joint to joint, and to the tool frame, and the strokes of joints that slide."""
         tool = self.pin.frames[self.tool].placement.translation
         return self.wrist_reach + float(np.linalg.norm(tool))
 
@@ -70,7 +70,16 @@ class RobotModel:
     def wrist_reach(self) -> float:
         """The same up to the last joint, without the hand [m]."""
         ends = [self.pin.jointPlacements[joint] for joint in range(2, self.arm + 1)]
-        return sum(float(np.linalg.norm(end.translation)) for end in ends)
+        return sum(float(np.linalg.norm(end.translation)) for end in ends) + sum(self.strokes)
+
+    @property
+    def strokes(self) -> list[float]:
+        """How far each arm joint slides from 0 at most [m], (arm,); 0 for one that turns."""
+        farthest = np.maximum(np.abs(self.lower), np.abs(self.upper)).tolist()
+        return [end if self._slides(k) else 0.0 for k, end in enumerate(farthest, 1)]
+
+    def _slides(self, joint: int) -> bool:
+        return bool(self.pin.joints[joint].shortname().startswith("JointModelP"))
 
     @property
     def has_one_jaw(self) -> bool:
@@ -85,9 +94,8 @@ class RobotModel:
     @property
     def finger_unit(self) -> str:
         """Of the fingers' positions: "m" where they slide, "rad" where one turns."""
-        joints = list(self.pin.joints)[self.arm + 1 :]
-        slide = all(joint.shortname().startswith("JointModelP") for joint in joints)
-        return "m" if slide else "rad"
+        fingers = range(self.arm + 1, self.pin.njoints)
+        return "m" if all(map(self._slides, fingers)) else "rad"
 
     @property
     def finger_lever(self) -> float:

@@ -197,7 +197,7 @@ class MotionLimits:
         acceleration: [rad/s^2].
         jerk: [rad/s^3].
         levers: distance of the fingertips from each arm joint's axis [m]: a turn of joint i by dq
-            moves them about levers[i] dq. Collisions are checked by it.
+            moves them about levers[i] dq; 1 of one that slides. Collisions are checked by it.
         finger_speed: of each finger [m/s]; of a jaw that turns [rad/s].
     """
 
