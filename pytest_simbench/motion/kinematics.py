@@ -168,7 +168,7 @@ def _joint_path(
             position = tuple(np.round(pose.translation, 3).tolist())
             raise Unreachable(f"unreachable: {what} to {position}")
         path.append(solution)
-    if np.abs(np.diff(np.array(path), axis=0)).max() > 0.5:
+    if np.abs(np.diff(np.array(path), axis=0)).max(initial=0.0) > 0.5:
         raise Unreachable(f"unreachable: the {what} needs a jump of the arm's configuration")
     return np.array(path)
 
