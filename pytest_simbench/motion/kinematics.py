@@ -240,11 +240,8 @@ class Servo:
         if scene.robot is None:
             raise LoopError(f"scene {scene.name!r} has no robot that a policy could move")
         self.model = RobotModel(scene.robot)
-        self._weights = self.model.pin.copy()
+        self._weights = self.model.weighing(scene.robot.column("gravity"))
         self._weights.gravity.linear = self.model.base.rotation.T @ np.array(scene.gravity)
-        for k, share in enumerate(scene.robot.column("gravity")[: self.model.pin.nq], 1):
-            link = self._weights.inertias[k]
-            self._weights.inertias[k] = pin.Inertia(share * link.mass, link.lever, link.inertia)
         self._data = self._weights.createData()
         limits = scene.robot.limits
         own = np.array(self.model.pin.velocityLimit[: self.model.arm])

@@ -39,6 +39,8 @@ class RobotModel:
         self._loaded: dict[tuple[object, ...], pin.Model] = {}
         self.effort_limits = robot.column("effort_limit")[: self.arm]
         self._fingers = robot.column("initial_position")[self.arm : self.pin.nq]
+        borne = 1.0 - robot.column("gravity")
+        self._borne = self.weighing(borne) if borne.any() else None
 
     @property
     def home(self) -> FloatArray:
@@ -142,7 +144,8 @@ class RobotModel:
         a: FloatArray,
         held: Body | None = None,
     ) -> FloatArray:
-        """Joint efforts of a motion, rows of (n, n_joints), rotor inertia included [N m, N].
+        """Joint efforts of a motion, rows of (n, n_joints), rotor inertia included, and of gravity
+        each link's share (`Joint.gravity`) [N m, N].
 
         Args:
             gravity: in the world [m/s^2], (3,).
@@ -152,7 +155,20 @@ class RobotModel:
         model = self.pin if held is None else self._carrying(held)
         model.gravity.linear = self.base.rotation.T @ np.asarray(gravity, dtype=float)
         data = self.data if held is None else model.createData()
-        return np.array([pin.rnea(model, data, *row).copy() for row in zip(q, v, a, strict=True)])
+        rows = np.array([pin.rnea(model, data, *row).copy() for row in zip(q, v, a, strict=True)])
+        if self._borne is not None:
+            self._borne.gravity.linear = model.gravity.linear
+            for efforts, row in zip(rows, q, strict=True):
+                efforts -= pin.computeGeneralizedGravity(self._borne, self.data, row)
+        return rows
+
+    def weighing(self, shares: FloatArray) -> pin.Model:
+        """The model, each link with a share of its mass, (n_joints,): for its weight alone."""
+        model = self.pin.copy()
+        for k, share in enumerate(shares[: model.nq], 1):
+            link = model.inertias[k]
+            model.inertias[k] = pin.Inertia(share * link.mass, link.lever, link.inertia)
+        return model
 
     def effort_shares(
         self,

@@ -150,6 +150,8 @@ def test_feed_forward_carries_the_arm(planner: MotionPlanner) -> None:
     expected = MODEL.inverse_dynamics(planner.gravity, q, zero, zero)[0, :7]
     assert np.allclose(still.effort[:, :7], expected, atol=0.2)
     assert (still.effort[:, 7:] == 0).all()
+    half = RobotModel(panda().with_joints(*panda().joint_names, gravity=0.5))  # its links' share
+    assert np.allclose(half.inverse_dynamics(planner.gravity, q, zero, zero)[0, :7], expected / 2)
 
 
 def test_a_path_at_a_speed_of_the_tool(planner: MotionPlanner) -> None:
