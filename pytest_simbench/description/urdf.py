@@ -24,7 +24,7 @@ from pytest_simbench.scene.checks import Wire
 from pytest_simbench.scene.pose import vector3
 
 ROOT = "base"
-"""Link of a reduced robot that is fixed in the world."""
+"""Link of a reduced robot that is fixed in the world; with a `_` where one of the name moves."""
 
 INERTIA = {f"i{'xyz'[row]}{'xyz'[k]}": (row, k) for row in range(3) for k in range(row, 3)}
 """Attributes of a URDF's tensor, ixx, ixy, ..., izz, and where each stands in it."""
@@ -96,7 +96,8 @@ class PreparedRobot:
         self._description = Description(robot.urdf, robot.packages)
         raw = {name: self._read_link(e) for name, e in self._description.links.items()}
         joints, root = self._description.joints, self._description.root
-        self.root = ROOT
+        kinds = {_required(joint, "child").attrib["link"]: joint.attrib["type"] for joint in joints}
+        self.root = ROOT if kinds.get(ROOT, "fixed") == "fixed" else f"{ROOT}_"
         self.links: dict[str, Link] = {self.root: Link(self.root)}
         self.joints: list[MovingJoint] = []
         self.limits: dict[str, FloatArray] = {}

@@ -316,12 +316,12 @@ def _standing(robot: Robot) -> Robot:
 
 def levers_of(model: RobotModel) -> tuple[float, ...]:
     """How far the fingertips can be from each arm joint's axis at most [m]: the lengths from joint
-    to joint up to the tool frame, and the opening of the hand, which for a jaw that turns is the
-    arc of its tip."""
+    to joint up to the tool frame, strokes included, and the opening of the hand, which for a jaw
+    that turns is the arc of its tip. 1 [m/m] for a joint that slides."""
     offsets = [
-        float(np.linalg.norm(model.pin.jointPlacements[joint].translation))
-        for joint in range(1, model.arm + 1)
+        float(np.linalg.norm(model.pin.jointPlacements[joint].translation)) + stroke
+        for joint, stroke in enumerate(model.strokes, 1)
     ]
     tool = float(np.linalg.norm(model.pin.frames[model.tool].placement.translation))
     rest = tool + model.robot.gripper.opened * model.finger_lever
-    return tuple(sum(offsets[joint + 1 :]) + rest for joint in range(model.arm))
+    return tuple(1.0 if s else sum(offsets[k:]) + rest for k, s in enumerate(model.strokes, 1))

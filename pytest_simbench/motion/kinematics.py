@@ -168,7 +168,7 @@ def _joint_path(
             position = tuple(np.round(pose.translation, 3).tolist())
             raise Unreachable(f"unreachable: {what} to {position}")
         path.append(solution)
-    if np.abs(np.diff(np.array(path), axis=0)).max() > 0.5:
+    if np.abs(np.diff(np.array(path), axis=0)).max(initial=0.0) > 0.5:
         raise Unreachable(f"unreachable: the {what} needs a jump of the arm's configuration")
     return np.array(path)
 
@@ -240,11 +240,8 @@ class Servo:
         if scene.robot is None:
             raise LoopError(f"scene {scene.name!r} has no robot that a policy could move")
         self.model = RobotModel(scene.robot)
-        self._weights = self.model.pin.copy()
+        self._weights = self.model.weighing(scene.robot.column("gravity"))
         self._weights.gravity.linear = self.model.base.rotation.T @ np.array(scene.gravity)
-        for k, share in enumerate(scene.robot.column("gravity")[: self.model.pin.nq], 1):
-            link = self._weights.inertias[k]
-            self._weights.inertias[k] = pin.Inertia(share * link.mass, link.lever, link.inertia)
         self._data = self._weights.createData()
         limits = scene.robot.limits
         own = np.array(self.model.pin.velocityLimit[: self.model.arm])

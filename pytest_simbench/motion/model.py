@@ -39,6 +39,8 @@ class RobotModel:
         self._loaded: dict[tuple[object, ...], pin.Model] = {}
         self.effort_limits = robot.column("effort_limit")[: self.arm]
         self._fingers = robot.column("initial_position")[self.arm : self.pin.nq]
+        borne = 1.0 - robot.column("gravity")
+        self._borne = self.weighing(borne) if borne.any() else None
 
     @property
     def home(self) -> FloatArray:
@@ -62,7 +64,7 @@ class RobotModel:
     @property
     def reach(self) -> float:
         """How far the tool can be from the axis of the first joint at most [m]: the lengths from
-        joint to joint, and to the tool frame."""
+        joint to joint, and to the tool frame, and the strokes of joints that slide."""
         tool = self.pin.frames[self.tool].placement.translation
         return self.wrist_reach + float(np.linalg.norm(tool))
 
@@ -70,7 +72,16 @@ class RobotModel:
     def wrist_reach(self) -> float:
         """The same up to the last joint, without the hand [m]."""
         ends = [self.pin.jointPlacements[joint] for joint in range(2, self.arm + 1)]
-        return sum(float(np.linalg.norm(end.translation)) for end in ends)
+        return sum(float(np.linalg.norm(end.translation)) for end in ends) + sum(self.strokes)
+
+    @property
+    def strokes(self) -> list[float]:
+        """How far each arm joint slides from 0 at most [m], (arm,); 0 for one that turns."""
+        farthest = np.maximum(np.abs(self.lower), np.abs(self.upper)).tolist()
+        return [end if self._slides(k) else 0.0 for k, end in enumerate(farthest, 1)]
+
+    def _slides(self, joint: int) -> bool:
+        return bool(self.pin.joints[joint].shortname().startswith("JointModelP"))
 
     @property
     def has_one_jaw(self) -> bool:
@@ -85,9 +96,8 @@ class RobotModel:
     @property
     def finger_unit(self) -> str:
         """Of the fingers' positions: "m" where they slide, "rad" where one turns."""
-        joints = list(self.pin.joints)[self.arm + 1 :]
-        slide = all(joint.shortname().startswith("JointModelP") for joint in joints)
-        return "m" if slide else "rad"
+        fingers = range(self.arm + 1, self.pin.njoints)
+        return "m" if all(map(self._slides, fingers)) else "rad"
 
     @property
     def finger_lever(self) -> float:
@@ -134,7 +144,8 @@ class RobotModel:
         a: FloatArray,
         held: Body | None = None,
     ) -> FloatArray:
-        """Joint efforts of a motion, rows of (n, n_joints), rotor inertia included [N m, N].
+        """Joint efforts of a motion, rows of (n, n_joints), rotor inertia included, and of gravity
+        each link's share (`Joint.gravity`) [N m, N].
 
         Args:
             gravity: in the world [m/s^2], (3,).
@@ -144,7 +155,20 @@ class RobotModel:
         model = self.pin if held is None else self._carrying(held)
         model.gravity.linear = self.base.rotation.T @ np.asarray(gravity, dtype=float)
         data = self.data if held is None else model.createData()
-        return np.array([pin.rnea(model, data, *row).copy() for row in zip(q, v, a, strict=True)])
+        rows = np.array([pin.rnea(model, data, *row).copy() for row in zip(q, v, a, strict=True)])
+        if self._borne is not None:
+            self._borne.gravity.linear = model.gravity.linear
+            for efforts, row in zip(rows, q, strict=True):
+                efforts -= pin.computeGeneralizedGravity(self._borne, self.data, row)
+        return rows
+
+    def weighing(self, shares: FloatArray) -> pin.Model:
+        """The model, each link with a share of its mass, (n_joints,): for its weight alone."""
+        model = self.pin.copy()
+        for k, share in enumerate(shares[: model.nq], 1):
+            link = model.inertias[k]
+            model.inertias[k] = pin.Inertia(share * link.mass, link.lever, link.inertia)
+        return model
 
     def effort_shares(
         self,

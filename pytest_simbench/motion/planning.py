@@ -28,6 +28,9 @@ CHECK_SPACING = 0.02
 """Farthest that the hand moves between two collision checks [m]. The planning scene's margin is
 more than half of it, so nothing is brushed in between. Both go with the scene's scale."""
 
+BEYOND = 1e-3
+"""How far beyond its limits an arm may be told to stand [rad, m]: less than drives hold."""
+
 MAX_CHECKS = 20_000
 """Collision checks after which a search gives up, about 2 s."""
 
@@ -64,17 +67,25 @@ class MotionPlanner:
         """Collision-free motion between two arm positions, fingers commanded to stay.
 
         Raises:
-            PlanningError: start or goal touch something, or no way was found.
+            PlanningError: start or goal touch something or lie beyond the joints' limits, `speed`
+                is no share, or no way was found.
         """
-        direct = straight_move(start, goal, self.limits, speed=speed)
-        if self.scene.first_collision(self._thinned(direct.position)) is None:
-            return self.set_points(direct, fingers)
+        low, high = self.model.lower, self.model.upper
         for what, arm in (("start", start), ("goal", goal)):
+            off = np.maximum(low - arm, arm - high)
+            if off.max() > BEYOND:
+                name = self.model.robot.joints[off.argmax()].name
+                raise PlanningError(f"{what} {off.max():.2g} rad or m beyond the limits of {name}")
             touching = self.scene.collision(arm)
             if touching is not None:
                 raise PlanningError(f"{what} in collision: {' and '.join(touching)}")
+        direct = straight_move(start, goal, self.limits, speed=speed)
+        if self.scene.first_collision(self._thinned(direct.position)) is None:
+            return self.set_points(direct, fingers)
+        first, last = np.clip([start, goal], low, high)  # OMPL waits for ever for what is beyond
         with _OMPL:
-            path = self._search(start, goal, int(self.rng.integers(1, 2**31)))
+            path = self._search(first, last, int(self.rng.integers(1, 2**31)))
+        path[[0, -1]] = start, goal
         path = self._shortened(path)
         parts = [straight_move(a, b, self.limits, speed=speed) for a, b in pairwise(path)]
         whole = Timed(*map(np.concatenate, zip(*parts, strict=True)))
@@ -122,8 +133,10 @@ class MotionPlanner:
         path = tool_path(self.model, start, poses)
         points = [self.model.tool_pose(start).position, *(pose.position for pose in poses)]
         length = float(np.linalg.norm(np.diff(np.array(points), axis=0), axis=1).sum())
-        fastest = along_path(path, self.limits).duration
-        timed = along_path(path, self.limits, speed=min(1.0, fastest * tool_speed / length))
+        timed = along_path(path, self.limits)
+        if length and timed.duration:  # else the tool turns on the spot, or stays
+            share = min(1.0, timed.duration * tool_speed / length)
+            timed = along_path(path, self.limits, speed=share)
         return self._touching_only(timed, fingers, ignored, "path")
 
     def _touching_only(
@@ -195,9 +208,7 @@ class MotionPlanner:
         arm = self.model.arm
         space = base.RealVectorStateSpace(arm)
         bounds = base.RealVectorBounds(arm)
-        for i in range(arm):
-            bounds.setLow(i, float(self.model.lower[i]))
-            bounds.setHigh(i, float(self.model.upper[i]))
+        bounds.low, bounds.high = self.model.lower.tolist(), self.model.upper.tolist()
         space.setBounds(bounds)
         information = base.SpaceInformation(space)
         checks = 0

@@ -8,6 +8,7 @@ import numpy as np
 import ruckig
 from scipy.interpolate import CubicSpline
 
+from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.scene import FloatArray, MotionLimits
 
 TICK = 0.004
@@ -34,10 +35,9 @@ def straight_move(
 
     Args:
         start, goal: arm joints, (arm,) [rad].
-        speed: share of the velocity limits; acceleration scales with its square, jerk with its
-            cube, which stretches time by 1 / speed.
+        speed: share of the velocity limits (`_shares`).
     """
-    return line_move(start, goal, limits, (speed, speed**2, speed**3))[0]
+    return line_move(start, goal, limits, _shares(speed))[0]
 
 
 def line_move(
@@ -81,7 +81,7 @@ def along_path(path: FloatArray, limits: MotionLimits, *, speed: float = 1.0) ->
 
     Args:
         path: way points, (n, arm) [rad], n >= 2.
-        speed: share of the velocity limits, as in `straight_move`.
+        speed: share of the velocity limits (`_shares`).
     """
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     keep = np.concatenate([[True], np.diff(length) > 1e-9])
@@ -95,7 +95,7 @@ def along_path(path: FloatArray, limits: MotionLimits, *, speed: float = 1.0) ->
     velocity = min((velocities / first).min(), np.sqrt(accelerations / 2 / second).min())
     acceleration = (accelerations / 2 / first).min()
     jerk = (jerks / 4 / first).min()
-    bounds = np.array([[velocity * speed], [acceleration * speed**2], [jerk * speed**3]])
+    bounds = np.array([[velocity], [acceleration], [jerk]]) * np.array([_shares(speed)]).T
     for _ in range(5):
         timed = _along(spline, float(length[-1]), bounds)
         excess = max(
@@ -107,6 +107,13 @@ def along_path(path: FloatArray, limits: MotionLimits, *, speed: float = 1.0) ->
         slower = 1.0 / (1.01 * excess)
         bounds = bounds * np.array([[slower], [slower**2], [slower**3]])
     return timed
+
+
+def _shares(speed: float) -> tuple[float, float, float]:
+    """Of velocity, acceleration and jerk: 1 / speed stretches time. Raises `PlanningError`."""
+    if not 0.0 < speed <= 1.0:
+        raise PlanningError(f"the speed is {speed:g}; give a share of the limits, above 0 to 1")
+    return speed, speed**2, speed**3
 
 
 def _bounds(limits: MotionLimits) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -43,7 +43,7 @@ class Joint(Wire):
 
     Attributes:
         name: as in the robot's URDF.
-        stiffness: k [N m/rad], or [N/m] for a prismatic joint.
+        stiffness: k [N m/rad], or [N/m] for a prismatic joint; at least `FREE`, which 0 becomes.
         damping: d [N m s/rad], or [N s/m].
         effort_limit: largest effort of the drive [N m], or [N].
         armature: rotor inertia as seen at the joint [kg m^2], or [kg].
@@ -79,6 +79,7 @@ class Joint(Wire):
         for quantity in (*of_drive, "passive_damping", "friction", "spring"):
             what = f"the {quantity} of joint {self.name!r}"
             check_number(getattr(self, quantity), what, 0.0, STIFFEST)
+        object.__setattr__(self, "stiffness", max(self.stiffness, FREE))
         check_number(self.initial_position, f"the initial position of joint {self.name!r}")
         check_number(self.rest, f"the rest position of the spring in joint {self.name!r}")
         what = f"the share of gravity of the link on joint {self.name!r}"
@@ -196,7 +197,7 @@ class MotionLimits:
         acceleration: [rad/s^2].
         jerk: [rad/s^3].
         levers: distance of the fingertips from each arm joint's axis [m]: a turn of joint i by dq
-            moves them about levers[i] dq. Collisions are checked by it.
+            moves them about levers[i] dq; 1 of one that slides. Collisions are checked by it.
         finger_speed: of each finger [m/s]; of a jaw that turns [rad/s].
     """
 

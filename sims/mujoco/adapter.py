@@ -1,7 +1,7 @@
 """MuJoCo (Google DeepMind), through its Python bindings.
 
-Drives are MuJoCo's own actuators, one a joint, with an affine bias: force = k (ctrl - q) - d v, so
-velocity and effort feed-forward ride on the control: ctrl = q* + (d v* + tau_ff) / k. The
+Drives are MuJoCo's own actuators, one a joint, with an affine bias: force = gain ctrl - k q - d v,
+so velocity and effort feed-forward ride on the control: ctrl = (k q* + d v* + tau_ff) / gain. The
 actuator's force range is the effort limit, so it bounds the whole sum.
 
 What was learnt stands in docs/engines/mujoco.md.
@@ -26,7 +26,7 @@ from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from .reading import Reading
 from .settings import CHOSEN_ON, PROFILES, FileSettings, MuJoCoSettings
-from .world import build, leave_out, shape_label
+from .world import build, gain, leave_out, shape_label
 
 mujoco = lazy_import("mujoco")
 
@@ -95,11 +95,11 @@ class MuJoCo(Simulator):
         self._q = np.array([joint.qposadr[0] for joint in joints], dtype=int)
         self._v = np.array([joint.dofadr[0] for joint in joints], dtype=int)
         if scene.robot is not None:
-            self._stiffness = scene.robot.column("stiffness")
-            self._damping = scene.robot.column("damping")
+            self._gain = gain(stiffness := scene.robot.column("stiffness"))
+            self._share, self._damping = stiffness / self._gain, scene.robot.column("damping")
             initial = scene.robot.column("initial_position")
             data.qpos[self._q] = initial
-            data.ctrl[:] = initial
+            self.command(initial, 0 * initial, 0 * initial)
         free = [model.joint(f"{body.name}/free") for body in scene.free_bodies]
         self._body_q = np.array([j.qposadr[0] + np.arange(7) for j in free], int).reshape(-1, 7)
         self._body_v = np.array([j.dofadr[0] + np.arange(3) for j in free], int).reshape(-1, 3)
@@ -141,7 +141,8 @@ class MuJoCo(Simulator):
         )
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
-        self.data.ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
+        asked = self._share * position + (self._damping * velocity + effort) / self._gain
+        self.data.ctrl[:] = np.clip(asked, -mujoco.mjMAXVAL, mujoco.mjMAXVAL)
 
     def push(self, wrenches: FloatArray) -> None:
         self.data.xfrc_applied[self._body_ids] = wrenches

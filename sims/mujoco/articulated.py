@@ -229,7 +229,7 @@ class Tree:
         self.drives.append(drive)
         return Joint(
             link.told,
-            max(drive.stiffness, FREE),
+            drive.stiffness,
             drive.damping,
             drive.limit if len(drive.numbers) else FREE,
             float(model.dof_armature[dof]) + drive.rotor,

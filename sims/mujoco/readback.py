@@ -18,7 +18,7 @@ from pytest_simbench.scene.pose import quaternion_of
 from pytest_simbench.simulator import heavy, lazy_import
 
 from .bounces import bounce
-from .world import closed
+from .world import closed, gain
 
 mujoco = lazy_import("mujoco")
 
@@ -244,7 +244,8 @@ class ReadBack(readback.ReadBack):
         slides = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
         drive = int(np.flatnonzero(model.actuator_trnid[:, 0] == joint)[0])
         gear = model.actuator_gear[drive, 0]
-        gain, bias = model.actuator_gainprm[drive], model.actuator_biasprm[drive]
+        bias = model.actuator_biasprm[drive]
+        held, pulled = -bias[1] * gear**2, model.actuator_gainprm[drive, 0] * gear
         limited = model.jnt_limited[joint] and not self.off & {"LIMIT", "CONSTRAINT"}
         limits = model.jnt_range[joint] if limited else [-np.inf, np.inf]
         drives = "ACTUATION" not in self.off
@@ -259,7 +260,7 @@ class ReadBack(readback.ReadBack):
             "axis": subspace(model.jnt_axis[joint], model.jnt_pos[joint], slides=slides),
             "limits": limits,
             "effort_limit": one_value(ends or np.inf),
-            "stiffness": spring + drives * one_value([gain[0] * gear, -bias[1] * gear**2]),
+            "stiffness": spring + drives * one_value([held, held + (pulled - gain(held))]),
             "damping": np.ravel(model.dof_damping[dof])[0] - drives * bias[2] * gear**2,
             "friction": model.dof_frictionloss[dof],
             "armature": model.dof_armature[dof],

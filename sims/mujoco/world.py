@@ -201,7 +201,7 @@ def _add_drive(spec: Any, joint: Joint) -> None:
         forcelimited=True,
         forcerange=[-joint.effort_limit, joint.effort_limit],
     )
-    drive.gainprm[0] = joint.stiffness
+    drive.gainprm[0] = gain(joint.stiffness)
     drive.biasprm[1], drive.biasprm[2] = -joint.stiffness, -joint.damping
     moved = _named(spec.joints, joint.name)
     moved.armature, moved.frictionloss, moved.springref = joint.armature, joint.friction, joint.rest
@@ -210,6 +210,12 @@ def _add_drive(spec: Any, joint: Joint) -> None:
     for field, value in (("damping", joint.passive_damping), ("stiffness", joint.spring)):
         polynomial = np.atleast_1d(getattr(moved, field))  # a number in releases before 3.5
         setattr(moved, field, [value, *polynomial[1:]] if len(polynomial) > 1 else value)
+
+
+def gain(stiffness: Any) -> Any:
+    """Of a drive's actuator, here and in Newton: effort for 1 of its control. At least 1: where a
+    control is above 1e10 (`mjMAXVAL`), MuJoCo takes 0 for all."""
+    return np.maximum(stiffness, 1.0)
 
 
 def _named(elements: Any, name: str) -> Any:

@@ -4,11 +4,10 @@ Newton is a builder of worlds and a set of solvers over them. The one here is So
 MuJoCo's C implementation: Newton's model is converted once, and each step copies Newton's state
 (single precision) into MuJoCo, steps that, and copies back.
 
-Drives are the position actuators of SolverMuJoCo (`newton.solvers.mujoco`), force = k (ctrl - q) -
-d v within the effort limit, so velocity and effort feed-forward ride on the control: ctrl = q* +
-(d v* + tau_ff) / k. Newton's own joint targets obey the same law but when they saturate: they are
-clipped at the joint, where MuJoCo's implicit integrator does not see it and goes on damping the
-drive. Joint 1 of the Panda then gains 58 % of the momentum that its effort limit allows.
+Drives are the actuators of SolverMuJoCo (`newton.solvers.mujoco`), told as in MuJoCo's adapter.
+Newton's own joint targets obey the same law but when they saturate: they are clipped at the joint,
+where MuJoCo's implicit integrator does not see it and goes on damping the drive. Joint 1 of the
+Panda then gains 58 % of the momentum that its effort limit allows.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from ..mujoco.own_file import FileReadBack, loaded
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from ..mujoco.settings import FileSettings
-from ..mujoco.world import leave_out, shape_label
+from ..mujoco.world import gain, leave_out, shape_label
 from .own_file import NewtonFile
 from .settings import CHOSEN_ON, PROFILES, NewtonSettings
 from .world import build_model, make_solver, names
@@ -193,8 +192,8 @@ class Newton(Simulator):
         self._led = led, [children.index(body) for body in led]
         self._free = [model.body_label.index(body.name) for body in scene.free_bodies]
         if scene.robot is not None:
-            self._stiffness = scene.robot.column("stiffness")
-            self._damping = scene.robot.column("damping")
+            self._gain = gain(stiffness := scene.robot.column("stiffness"))
+            self._share, self._damping = stiffness / self._gain, scene.robot.column("damping")
 
     def read_back(self) -> dict[str, Any]:
         """From MuJoCo's model, which is what is stepped."""
@@ -230,7 +229,8 @@ class Newton(Simulator):
         return numbers
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
-        self._ctrl[:] = position + (self._damping * velocity + effort) / self._stiffness
+        asked = self._share * position + (self._damping * velocity + effort) / self._gain
+        self._ctrl[:] = np.clip(asked, -mujoco.mjMAXVAL, mujoco.mjMAXVAL)
 
     def push(self, wrenches: FloatArray) -> None:
         for state in self._states:  # which take turns

@@ -22,7 +22,7 @@ from pytest_simbench.scene import (
 )
 from pytest_simbench.simulator import PreparedRobot, heavy, lazy_import
 
-from ..mujoco.world import shape_label
+from ..mujoco.world import gain, shape_label
 from .settings import NewtonSettings
 
 newton = lazy_import("newton")
@@ -207,11 +207,13 @@ def _set_drive(builder: Any, number: int, joint: Joint) -> None:
     builder.joint_stiffness[dof], builder.joint_rest_q[coordinate] = joint.spring, joint.rest
     builder.joint_q[coordinate] = joint.initial_position
     drives = newton.solvers.mujoco
-    drives.add_actuator_position(
+    told = gain(joint.stiffness)
+    drives.add_actuator_general(
         builder,
         drives.ActuatorTarget.joint(number),
-        kp=joint.stiffness,
-        kv=joint.damping,
+        biastype="affine",
+        gainprm=(told,),
+        biasprm=(0.0, -joint.stiffness, -joint.damping),
         forcerange=(-joint.effort_limit, joint.effort_limit),
-        ctrl=joint.initial_position,
+        ctrl=joint.stiffness / told * joint.initial_position,
     )

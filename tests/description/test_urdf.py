@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,13 @@ def test_mass_is_conserved() -> None:
     masses = [float(m.attrib["value"]) for m in ET.parse(robot.urdf).iter("mass")]
     prepared = PreparedRobot(robot)
     assert sum(link.mass for link in prepared.links.values()) == pytest.approx(sum(masses))
+
+
+def test_a_link_that_moves_may_be_named_base(tmp_path: Path) -> None:
+    file = tmp_path / "arm.urdf"
+    file.write_text(Path(panda().urdf).read_text().replace('"panda_link1"', '"base"'))
+    prepared = PreparedRobot(replace(panda(), urdf=str(file)))
+    assert list(prepared.links)[:3] == ["base_", "base", "panda_link2"]
 
 
 @pytest.mark.parametrize("base", [Pose(), Pose.at(0.3, -0.2, 0.5, yaw=0.7)])

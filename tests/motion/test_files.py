@@ -45,6 +45,14 @@ def test_a_file_says_everything(tmp_path: Path) -> None:
     assert limits.levers == pytest.approx((0.2 + 0.3 + 0.42, 0.3 + 0.42, 0.42))
 
 
+def test_an_arm_reaches_as_much_farther_as_a_joint_slides(tmp_path: Path) -> None:
+    slider = joint("bend", "upper", "lower", "0 0 0.3", "0 0 1", "prismatic")  # by 0.05 m
+    urdf = URDF.replace(joint("bend", "upper", "lower", "0 0 0.3", "0 1 0"), slider)
+    robot = read_robot(small_arm(tmp_path, TOML.replace("1.2]", "0.01]"), urdf))
+    assert robot.limits.levers == pytest.approx((0.2 + 0.35 + 0.42, 0.35 + 0.42, 1.0))
+    assert RobotModel(robot).reach == pytest.approx(0.2 + 0.35 + 0.38)
+
+
 def test_what_a_file_says_besides(tmp_path: Path) -> None:
     more = TOML.replace(
         "[arm]",

@@ -102,6 +102,16 @@ def test_other_cubes_are_obstacles(scene: Scene, planner: MotionPlanner) -> None
         planner.move_to(READY, at, 0.035)
 
 
+def test_what_cannot_be_planned_says_so(planner: MotionPlanner) -> None:
+    with pytest.raises(PlanningError, match=r"^goal 0.002 rad or m beyond the limits of panda"):
+        planner.move_to(READY, MODEL.upper + 0.002, 0.0)
+    for speed in (0.0, 1.5):
+        with pytest.raises(PlanningError, match="; give a share of the limits, above 0 to 1"):
+            planner.move_to(READY, READY + 0.1, 0.0, speed=speed)
+    for poses in ([MODEL.tool_pose(READY)], []):  # without a way the arm stays
+        assert planner.move_along(READY, poses, 0.0, tool_speed=0.1).duration == 0.0
+
+
 def test_a_held_cube_moves_with_the_hand(scene: Scene, planner: MotionPlanner) -> None:
     planning = planner.scene
     planning.opening = 0.025
@@ -140,6 +150,8 @@ def test_feed_forward_carries_the_arm(planner: MotionPlanner) -> None:
     expected = MODEL.inverse_dynamics(planner.gravity, q, zero, zero)[0, :7]
     assert np.allclose(still.effort[:, :7], expected, atol=0.2)
     assert (still.effort[:, 7:] == 0).all()
+    half = RobotModel(panda().with_joints(*panda().joint_names, gravity=0.5))  # its links' share
+    assert np.allclose(half.inverse_dynamics(planner.gravity, q, zero, zero)[0, :7], expected / 2)
 
 
 def test_a_path_at_a_speed_of_the_tool(planner: MotionPlanner) -> None:

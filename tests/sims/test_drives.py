@@ -86,6 +86,7 @@ def test_both_fingers_press_with_the_squeeze(name: str, fine: dict[str, Any], bo
 
 def test_a_motor_is_a_drive_without_stiffness_and_damping() -> None:
     assert [joint.motor for joint in ROBOT.joints] == [True, False]
+    assert ROBOT.joints[0] == replace(ROBOT.joints[0], stiffness=0.0)  # engines divide by it
     assert not Part("free", Y).drive.motor  # whose effort limit is next to nothing
     assert not Part("braked", Y, damping=1.0, effort=STRONG).drive.motor
     assert "motor" in Scene("both", robot=ROBOT).words
@@ -93,11 +94,11 @@ def test_a_motor_is_a_drive_without_stiffness_and_damping() -> None:
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet", "dart", "sapien"])
 def test_a_motor_pushes_beside_a_drive(name: str) -> None:
-    """Up to its limit, until the next command, also after a state was restored; the drive holds,
-    and the joint's wrench is what the motor pushes."""
+    """Up to its limit, whatever it is told, until the next command, also after a state was
+    restored; the drive holds, and the joint's wrench is what the motor pushes."""
     simulator = loaded(adapter(name), Scene("both", robot=ROBOT))
     rest = np.zeros(2)
-    simulator.command(rest, rest, np.array([100.0, 0.0]))
+    simulator.command(rest, rest, np.array([2e4, 0.0]))
     for _ in range(10):
         simulator.step()
     gained = (15.0 + STANDARD_GRAVITY[2]) * simulator.time
