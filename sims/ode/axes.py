@@ -27,7 +27,6 @@ class Axis:
     Attributes:
         child, parent: bodies of ODE; None for the world.
         angle: ODE's position of the joint, whole turns added where it is wide [rad or m].
-        rate: its velocity [rad/s or m/s].
         turn: whole turns, and the last angle that ODE told; of a wide joint.
         stops: joint of ODE that holds it at its limits: itself, or a motor of a wide one.
         stopped: whether that motor acted in the last step.
@@ -44,8 +43,6 @@ class Axis:
         self.turn: list[float] = [0.0, 0.0]
         told: Callable[[], float] = joint.getAngle if self.hinged else joint.getPosition
         self.angle = _counted(told, self.turn) if wide else told
-        rate = joint.getAngleRate if self.hinged else joint.getPositionRate
-        self.rate: Callable[[], float] = rate
 
     def limit(self, world: Any, lower: float, upper: float) -> None:
         """Stop at ODE's positions `lower` and `upper` [rad or m].
@@ -117,6 +114,16 @@ class Axis:
     def position(self) -> float:
         """[rad or m]."""
         return self.zero + self.angle()
+
+    def rate(self) -> float:
+        """Its velocity [rad/s or m/s]. That which ODE tells of a slider leaves out that the parent
+        turns."""
+        if self.hinged:
+            return float(self.joint.getAngleRate())
+        (x, y, z), (u, v, w) = self.joint.getAxis(), self.child.getLinearVel()
+        place = self.child.getPosition()
+        a, b, c = self.parent.getPointVel(place) if self.parent else (0.0, 0.0, 0.0)
+        return float(x * (u - a) + y * (v - b) + z * (w - c))
 
 
 def _counted(told: Callable[[], float], turn: list[float]) -> Callable[[], float]:

@@ -191,6 +191,21 @@ def test_joints_of_one_link_are_coupled(worlds: Worlds, other: Part, ratio: floa
     assert following == pytest.approx(ratio * led, abs=3e-3)
 
 
+SLIDE = Part("slide", (1.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.1, 0.0, 0.2), slides=True)
+
+
+def fallen(worlds: Worlds, **held: float) -> FloatArray:
+    """Positions and velocities of a lever that falls, and of a slider on it with this drive."""
+    robot = mechanism("polar", LEVER, SLIDE).with_joints("slide", **held)
+    world = worlds.load(Scene("polar", robot=robot))
+    world.wait(0.3)
+    return world.joints
+
+
+def test_a_slider_that_is_held_on_what_turns_has_no_velocity(worlds: Worlds) -> None:
+    assert fallen(worlds, stiffness=1e6, effort_limit=1e6)[1, 1] == pytest.approx(0.0, abs=0.01)
+
+
 def test_joints_of_no_common_link_are_refused(worlds: Worlds) -> None:
     robot = mechanism(
         "far", LEVER, ON_LEVER, replace(RACK, on=None), couplings=(Coupling("rack", "lever"),)
