@@ -56,23 +56,13 @@ class Rotor:
 
     def __init__(self, world: Any, axis: Axis, inertia: float, timestep: float) -> None:
         self.axis = axis
-        self.motor = ode.AMotor(world) if axis.hinged else ode.LMotor(world)
-        self.motor.attach(axis.child, axis.parent)
-        self.motor.setNumAxes(1)
-        self.motor.setAxis(0, 1, axis.joint.getAxis())  # 1: turns with the child
+        self.motor = axis.motor(world)
         self.motor.setParam(MOST_FORCE, ode.Infinity)
         self.motor.setParam(SOFTNESS, timestep / inertia)
 
     def turn(self) -> None:
         """Before a step: keep the present velocity."""
-        self.motor.setParam(VELOCITY, self.axis.rate() if self.axis.hinged else self._speed())
-
-    def _speed(self) -> float:
-        """Of the bodies' centres along the axis [m/s], which is what a linear motor moves."""
-        x, y, z = self.axis.joint.getAxis()
-        u, v, w = self.axis.child.getLinearVel()
-        a, b, c = self.axis.parent.getLinearVel() if self.axis.parent else (0.0, 0.0, 0.0)
-        return float(x * (u - a) + y * (v - b) + z * (w - c))
+        self.motor.setParam(VELOCITY, self.axis.rate())
 
 
 class Passive:

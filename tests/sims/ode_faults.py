@@ -6,7 +6,6 @@ setting `fault` names the quantity.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import weakref
 from dataclasses import replace
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 from pytest_simbench.sims.ode.adapter import ODE
 from pytest_simbench.sims.ode.contacts import distinct
-from pytest_simbench.sims.ode.library import Mesh, body_id, library, place
+from pytest_simbench.sims.ode.library import Mesh, library, place, set_damping
 
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import lazy_import
@@ -102,12 +101,7 @@ def aside(s: Any) -> None:
 
 
 def damped(name: str) -> Plant:
-    def plant(s: Any) -> None:
-        tell = library().dBodySetLinearDamping
-        tell.argtypes = [ctypes.c_void_p, ctypes.c_double]
-        tell(body_id(part(s, name).body), 1e-4)
-
-    return plant
+    return lambda s: set_damping(part(s, name).body, np.array([1e-4, 0.0]))
 
 
 def step(s: Any) -> None:

@@ -206,6 +206,12 @@ def test_a_slider_that_is_held_on_what_turns_has_no_velocity(worlds: Worlds) -> 
     assert fallen(worlds, stiffness=1e6, effort_limit=1e6)[1, 1] == pytest.approx(0.0, abs=0.01)
 
 
+def test_the_rotor_of_a_slider_turns_nothing(worlds: Worlds) -> None:
+    """A heavy one holds the slider, which falls with the lever as one body."""
+    held = fallen(worlds, stiffness=1e6, effort_limit=1e6)
+    np.testing.assert_allclose(fallen(worlds, armature=1e4), held, atol=0.03)
+
+
 def test_joints_of_no_common_link_are_refused(worlds: Worlds) -> None:
     robot = mechanism(
         "far", LEVER, ON_LEVER, replace(RACK, on=None), couplings=(Coupling("rack", "lever"),)
