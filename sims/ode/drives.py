@@ -201,9 +201,7 @@ class Drives:
 
     def state(self) -> FloatArray:
         """Positions and velocities, (2, n_joints)."""
-        return np.array(
-            [[axis.position() for axis in self.axes], [axis.rate() for axis in self.axes]]
-        )
+        return np.array([(axis.position(), axis.rate()) for axis in self.axes]).reshape(-1, 2).T
 
 
 def _law(

@@ -96,16 +96,8 @@ def weightless(name: str) -> Plant:
     return lambda s: part(s, name).body.setGravityMode(False)
 
 
-def aside(s: Any) -> None:
-    part(s, "cube_05").frame = Pose.at(0.01, 0.0, 0.0)
-
-
 def damped(name: str) -> Plant:
     return lambda s: set_damping(part(s, name).body, np.array([1e-4, 0.0]))
-
-
-def step(s: Any) -> None:
-    s.settings = replace(s.settings, timestep=0.003)
 
 
 def uncoupled(s: Any) -> None:
@@ -114,9 +106,9 @@ def uncoupled(s: Any) -> None:
 
 
 FAULTS: dict[str, Plant] = {
-    "timestep": step,
+    "timestep": lambda s: setattr(s, "settings", replace(s.settings, timestep=0.003)),
     "ground/height": lambda s: part(s, "ground").geoms[0].setParams((0.0, 0.0, 1.0), 0.01),
-    "body/cube_05/com": aside,
+    "body/cube_05/com": lambda s: setattr(part(s, "cube_05"), "frame", Pose.at(0.01, 0.0, 0.0)),
     "body/cube_05/gravity": weightless("cube_05"),
     "body/cube_05/touches": ghost("cube_05"),
     "body/cube_05/dynamic": lambda s: part(s, "cube_05").body.setKinematic(),
