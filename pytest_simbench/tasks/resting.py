@@ -55,9 +55,23 @@ def calm(world: World, seconds: float, phase: str) -> tuple[Motion, list[Forces]
         for k in range(1, LOOKS + 1):
             until = began + k * RESTLESS / LOOKS
             parts.append(world.wait(until - world.time, log_period=LOG_PERIOD))
-            if k == 1 or forces:
-                forces += [found] if (found := told_forces(world)) is not None else []
+            found = told_forces(world) if k == 1 or forces else None
+            if found is not None:
+                forces.append(_with_asleep(world, found, forces[-1] if forces else {}))
     return Motion.joined(parts), forces
+
+
+def _with_asleep(world: World, found: Forces, before: Forces) -> Forces:
+    """The forces, and those of the look before on bodies that sleep since then: they stand still,
+    and nothing is told of what holds them."""
+    rows = zip(world.scene.free_bodies, world.bodies, strict=True)
+    moves = {f"body/{body.name}": bool(row[7:].any()) for body, row in rows}
+    held = dict(found)
+    for pair, force in before.items():
+        ends = [moves.get(name) for name in pair]
+        if False in ends and True not in ends and not np.any(found.get(pair, 0.0)):
+            held[pair] = force
+    return held
 
 
 def told_forces(world: World) -> Forces | None:

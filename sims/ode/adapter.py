@@ -136,7 +136,7 @@ class ODE(Simulator):
         self._links = build.add_links(self.world, self.contacts.space, prepared)
         for pair in joined(prepared) if robot.self_collide else ():
             self.contacts.apart.add(frozenset(id(self._links[name].surface) for name in pair))
-        self._axes = build.add_joints(self.world, prepared, self._links)
+        self._axes = build.add_joints(self.world, prepared, self._links, s.timestep)
         build.put_links(prepared, self._links, {j.name: j.initial_position for j in robot.joints})
         for joint in robot.joints:
             self._axes[joint.name].stands(joint.initial_position)
@@ -230,9 +230,8 @@ class ODE(Simulator):
         if self.prepared is None:
             return np.empty((0, 6))
         frames = {joint.name: self._links[joint.child].frame for joint in self.prepared.joints}
-        dt = self.settings.timestep
         names = self.prepared.robot.joint_names
-        return np.array([self._axes[name].wrench(frames[name], dt) for name in names])
+        return np.array([self._axes[name].wrench(frames[name]) for name in names])
 
     def contact_count(self) -> int:
         return len(self.contacts.made)

@@ -22,20 +22,20 @@ class Axis:
     Args:
         joint: of ODE, attached to the child first, then to the parent or None.
         zero: the joint's position in the scene where ODE's is 0 [rad or m].
+        timestep: [s].
         wide: whether it turns farther than ODE tells, -pi to pi.
 
     Attributes:
         child, parent: bodies of ODE; None for the world.
         angle: ODE's position of the joint, whole turns added where it is wide [rad or m].
-        rate: its velocity [rad/s or m/s].
         turn: whole turns, and the last angle that ODE told; of a wide joint.
         stops: joint of ODE that holds it at its limits: itself, or a motor of a wide one.
         stopped: whether that motor acted in the last step.
         motors: joints of ODE that act beside it.
     """
 
-    def __init__(self, joint: Any, zero: float, wide: bool = False) -> None:
-        self.joint, self.zero, self.wide = joint, zero, wide
+    def __init__(self, joint: Any, zero: float, timestep: float, wide: bool) -> None:
+        self.joint, self.zero, self.timestep, self.wide = joint, zero, timestep, wide
         self.stops, self.stopped = joint, False
         self.motors: list[Any] = []
         joint.setFeedback(True)
@@ -44,8 +44,6 @@ class Axis:
         self.turn: list[float] = [0.0, 0.0]
         told: Callable[[], float] = joint.getAngle if self.hinged else joint.getPosition
         self.angle = _counted(told, self.turn) if wide else told
-        rate = joint.getAngleRate if self.hinged else joint.getPositionRate
-        self.rate: Callable[[], float] = rate
 
     def limit(self, world: Any, lower: float, upper: float) -> None:
         """Stop at ODE's positions `lower` and `upper` [rad or m].
@@ -92,13 +90,9 @@ class Axis:
         low, high = self.stops.getParam(LO_STOP), self.stops.getParam(HI_STOP)
         self.stopped = not low < angle < high
 
-    def wrench(self, frame: Pose, timestep: float) -> FloatArray:
-        """What it did to its child in the last step, motors included, in the world, (6,).
-
-        Args:
-            frame: of the link in the child's, about whose origin the torque is.
-            timestep: of the last step, at whose begin the child stood where it acted [s].
-        """
+    def wrench(self, frame: Pose) -> FloatArray:
+        """What it did to its child in the last step, motors included, in the world, (6,), about the
+        origin of the link's `frame` in the child's: where that was at the begin of the step."""
         force, torque = map(np.array, self.joint.getFeedback()[:2])  # about the child's centre
         for motor in self.motors:
             pull, turn = motor.getFeedback()[:2]
@@ -106,7 +100,7 @@ class Axis:
         if self.stopped:  # ODE writes no feedback of what did nothing
             torque = torque + self.stops.getFeedback()[1]
         offset = np.array(self.child.vectorToWorld(frame.position))
-        offset -= timestep * np.cross(self.child.getAngularVel(), offset)
+        offset -= self.timestep * np.cross(self.child.getAngularVel(), offset)
         return np.concatenate([force, torque - np.cross(offset, force)])
 
     def stands(self, position: float) -> None:
@@ -117,6 +111,17 @@ class Axis:
     def position(self) -> float:
         """[rad or m]."""
         return self.zero + self.angle()
+
+    def rate(self) -> float:
+        """Its velocity, as the last step's solver has set it, where the bodies stood at its begin
+        [rad/s or m/s]. What ODE tells of a slider leaves out that the parent turns."""
+        if self.hinged:
+            return float(self.joint.getAngleRate())
+        velocity = np.array(self.child.getLinearVel())
+        if self.parent is not None:
+            away = self.timestep * (velocity - self.parent.getLinearVel())
+            velocity -= self.parent.getPointVel(self.child.getPosition() - away)
+        return float(velocity @ self.joint.getAxis())
 
 
 def _counted(told: Callable[[], float], turn: list[float]) -> Callable[[], float]:

@@ -147,8 +147,10 @@ class Contacts:
 
     def forces(self) -> Iterator[tuple[Surface, Surface, FloatArray]]:
         """Both surfaces of each joint, and the wrench of the second on the first in the last step,
-        about the world's origin [N, N m], (6,)."""
+        about the world's origin [N, N m], (6,). None of what fell asleep in it: ODE writes none."""
         for joint, first, second in self.made:
+            if not _awake(first.body, second.body):
+                continue
             if first.body is None:  # ODE's first body is one that can move
                 first, second = second, first
             force, torque = map(np.array, joint.getFeedback()[:2])  # about its centre
@@ -160,8 +162,8 @@ class Contacts:
         if self.apart and frozenset((id(a), id(b))) in self.apart:
             return
         one, other = a.body, b.body
-        if not ((one is not None and one.isEnabled()) or (other is not None and other.isEnabled())):
-            return  # both asleep, or one asleep upon what never moves
+        if not _awake(one, other):
+            return
         contacts = self._collide(first, second)
         if len(contacts) > 1 and (isinstance(first, Mesh) or isinstance(second, Mesh)):
             contacts = distinct(contacts)
@@ -196,6 +198,11 @@ def _empty(group: Any, joints: list[tuple[Any, Surface, Surface]]) -> None:
         joint.setFeedback(False)
     joints.clear()
     group.empty()
+
+
+def _awake(one: Any, other: Any) -> bool:
+    """Whether one of two bodies is; None never moves."""
+    return any(body is not None and body.isEnabled() for body in (one, other))
 
 
 def _nothing(_: Any, first: Any, second: Any) -> None:

@@ -46,68 +46,48 @@ EXPLICIT = 0.01
 own inertia: stable without any, up to four times that."""
 
 
-class Rotor:
-    """A rotor on a joint, as a motor between the joint's bodies.
-
-    Args:
-        inertia: J as seen at the joint [kg m^2 or kg].
-        timestep: [s].
-    """
-
-    def __init__(self, world: Any, axis: Axis, inertia: float, timestep: float) -> None:
-        self.axis = axis
-        self.motor = ode.AMotor(world) if axis.hinged else ode.LMotor(world)
-        self.motor.attach(axis.child, axis.parent)
-        self.motor.setNumAxes(1)
-        self.motor.setAxis(0, 1, axis.joint.getAxis())  # 1: turns with the child
-        self.motor.setParam(MOST_FORCE, ode.Infinity)
-        self.motor.setParam(SOFTNESS, timestep / inertia)
-
-    def turn(self) -> None:
-        """Before a step: keep the present velocity."""
-        self.motor.setParam(VELOCITY, self.axis.rate() if self.axis.hinged else self._speed())
-
-    def _speed(self) -> float:
-        """Of the bodies' centres along the axis [m/s], which is what a linear motor moves."""
-        x, y, z = self.axis.joint.getAxis()
-        u, v, w = self.axis.child.getLinearVel()
-        a, b, c = self.axis.parent.getLinearVel() if self.axis.parent else (0.0, 0.0, 0.0)
-        return float(x * (u - a) + y * (v - b) + z * (w - c))
-
-
 class Passive:
-    """What a joint does by itself: its spring, damping and dry friction.
+    """What a joint does by itself: its spring, damping, dry friction and rotor.
 
     Args:
+        rotor: its inertia as seen at the joint [kg m^2 or kg]; 0: none.
         timestep: [s].
 
     Attributes:
         gain: velocity that the spring asks for at unit distance from its rest [1/s].
         ahead: time after which the spring is told where it stands [s].
         damper: motor that is spring and damping; None for neither.
-        brake: motor that is the friction; None for none.
+        brake, rotor: motors that are friction and rotor; None for none.
     """
 
-    def __init__(self, world: Any, axis: Axis, joint: Joint, timestep: float) -> None:
+    def __init__(self, world: Any, axis: Axis, joint: Joint, rotor: float, timestep: float) -> None:
         self.axis, self.rest = axis, joint.rest
-        self.damper: Any = None
-        self.brake: Any = None
         soft = timestep**2 * joint.spring < axis.inertia()
         self.ahead = (EXPLICIT if soft else 1.0) * timestep
         resistance = self.ahead * joint.spring + joint.passive_damping
         self.gain = joint.spring / resistance if resistance else 0.0
-        if resistance:
-            self.damper = axis.motor(world)
-            self.damper.setParam(MOST_FORCE, ode.Infinity)
-            self.damper.setParam(SOFTNESS, 1 / resistance)
-        if joint.friction:
-            self.brake = axis.motor(world)
+        self.damper = _motor(world, axis, 1 / resistance if resistance else None)
+        self.rotor = _motor(world, axis, timestep / rotor if rotor else None)
+        self.brake = axis.motor(world) if joint.friction else None
+        if self.brake is not None:
             self.brake.setParam(MOST_FORCE, joint.friction)
 
-    def pull(self) -> None:
-        """Before a step: tell the spring where the joint stands."""
+    def act(self) -> None:
+        """Before a step: the spring is told where the joint stands, the rotor its velocity."""
         if self.gain:
             self.damper.setParam(VELOCITY, self.gain * (self.rest - self.axis.position()))
+        if self.rotor is not None:
+            self.rotor.setParam(VELOCITY, self.axis.rate())
+
+
+def _motor(world: Any, axis: Axis, softness: float | None) -> Any:
+    """A motor without a limit beside the drive's, of this CFM; None for none."""
+    if softness is None:
+        return None
+    motor = axis.motor(world)
+    motor.setParam(MOST_FORCE, ode.Infinity)
+    motor.setParam(SOFTNESS, softness)
+    return motor
 
 
 class Drives:
@@ -118,8 +98,7 @@ class Drives:
         position_gain: P of the kind `velocity` [1/s].
 
     Attributes:
-        rotors: by name of the joint, but those of two coupled fingers.
-        passive: what joints do by themselves, by name of those that do something.
+        passive: what joints do by themselves, by name; two coupled fingers have no rotors.
         pinions: couple joints, by follower; that of two fingers has their rotors.
         commanded: the last set points: position, velocity, effort.
     """
@@ -150,16 +129,10 @@ class Drives:
             if pair in robot.gripper.couplings and len(fingers) == 2:
                 rotors = sum(inertias.pop(name) for name in robot.gripper.joints)
             self.pinions[pair.follower] = Pinion(world, pair, axes, rotors, timestep)
-        self.rotors = {
-            name: Rotor(world, axes[name], inertia, timestep)
-            for name, inertia in inertias.items()
-            if inertia > 0
-        }
-        self.passive = {
-            joint.name: Passive(world, axes[joint.name], joint, timestep)
-            for joint in robot.joints
-            if joint.passive_damping or joint.spring or joint.friction
-        }
+        self.passive: dict[str, Passive] = {}
+        for joint in robot.joints:
+            rotor = inertias.get(joint.name, 0.0)
+            self.passive[joint.name] = Passive(world, axes[joint.name], joint, rotor, timestep)
         coupled = {*fingers, *(a for pinion in self.pinions.values() for a in pinion.joints)}
         self._motors = []
         for axis, gain, soft in zip(self.axes, self._shares[0], softness, strict=True):
@@ -196,10 +169,8 @@ class Drives:
                 effort = abs(velocity - axis.rate()) / (self._softness[axis] or 1.0)
                 tell(MOST_FORCE, min(self._limits[axis], effort))
                 self._eased.append(axis)
-        for rotor in self.rotors.values():
-            rotor.turn()
         for passive in self.passive.values():
-            passive.pull()
+            passive.act()
         for pinion in self.pinions.values():
             pinion.mesh()
 
@@ -211,9 +182,7 @@ class Drives:
 
     def state(self) -> FloatArray:
         """Positions and velocities, (2, n_joints)."""
-        return np.array(
-            [[axis.position() for axis in self.axes], [axis.rate() for axis in self.axes]]
-        )
+        return np.array([(axis.position(), axis.rate()) for axis in self.axes]).reshape(-1, 2).T
 
 
 def _law(

@@ -151,20 +151,18 @@ class ReadBack(readback.ReadBack):
             "armature": 0.0,
             "friction": 0.0,
         }
-        if name in drives.passive:
-            passive = drives.passive[name]
-            if passive.damper is not None:
-                resistance = 1 / passive.damper.getParam(SOFTNESS)
-                found["stiffness"] += resistance * passive.gain
-                found["damping"] += resistance * (1 - passive.ahead * passive.gain)
-            if passive.brake is not None:
-                found["friction"] = passive.brake.getParam(MOST_FORCE)
-        if name in drives.rotors:
-            softness = drives.rotors[name].motor.getParam(SOFTNESS)
-            found["armature"] = self.timestep / softness
+        passive = drives.passive[name]
+        if passive.damper is not None:
+            resistance = 1 / passive.damper.getParam(SOFTNESS)
+            found["stiffness"] += resistance * passive.gain
+            found["damping"] += resistance * (1 - passive.ahead * passive.gain)
+        if passive.brake is not None:
+            found["friction"] = passive.brake.getParam(MOST_FORCE)
+        if passive.rotor is not None:
+            found["armature"] = self.timestep / passive.rotor.getParam(SOFTNESS)
         for pair in self.prepared.robot.gripper.couplings:
             pinion = drives.pinions[pair.follower]
-            if name not in drives.rotors and axis in pinion.joints:
+            if passive.rotor is None and axis in pinion.joints:
                 found["armature"] = pinion.inertia / 2
         return found
 

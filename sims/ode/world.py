@@ -112,7 +112,9 @@ SLACK = 0.2
 """A range so much smaller than a turn is wide too: at a stop a joint gives way a little [rad]."""
 
 
-def add_joints(world: Any, prepared: PreparedRobot, links: Mapping[str, Part]) -> dict[str, Axis]:
+def add_joints(
+    world: Any, prepared: PreparedRobot, links: Mapping[str, Part], timestep: float
+) -> dict[str, Axis]:
     """The joints by name; the links stand in the middle of every joint's range."""
     places, zeros = link_poses(prepared, middle(prepared)), middle(prepared)
     axes = {}
@@ -121,6 +123,7 @@ def add_joints(world: Any, prepared: PreparedRobot, links: Mapping[str, Part]) -
         axis = Axis(
             _joint(world, joint, links, places[joint.child]),
             zeros[joint.name],
+            timestep,
             wide=joint.kind == "revolute" and upper - lower > math.tau - SLACK,
         )
         axis.limit(world, lower, upper)

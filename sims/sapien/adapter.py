@@ -112,6 +112,7 @@ class SAPIEN(Simulator):
         self._bodies = {b.name: add_body(self._world, b, damped, groups) for b in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[box.name] for box in scene.prescribed_bodies]
+        self._prescribed = {k: b.velocity for k, b in enumerate(scene.free_bodies) if b.prescribed}
         packed = self._system.rigid_dynamic_components
         self._rows = [packed.index(body) for body in self._free]
         self._robot: Any = None
@@ -241,7 +242,10 @@ class SAPIEN(Simulator):
     def body_state(self) -> FloatArray:
         # All in one call; body by body it takes ten times as long, a third of the stepping.
         packed = np.frombuffer(self._system.pack(), np.float32, count=13 * len(self._rows))
-        return packed.reshape(-1, 13)[self._rows][:, PACKED].astype(float)
+        state = packed.reshape(-1, 13)[self._rows][:, PACKED].astype(float)
+        for k, velocity in self._prescribed.items():  # PhysX has it after a step alone
+            state[k, 7:] = velocity
+        return state
 
     def joint_state(self) -> FloatArray:
         if self._robot is None:

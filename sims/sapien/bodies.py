@@ -83,14 +83,13 @@ def add_body(world: Any, box: Body, angular_damping: float, groups: Groups) -> A
     builder.initial_pose = sapien.Pose(box.pose.position, box.pose.quaternion)
     if box.fixed:
         entity = builder.build_static(box.name)
-        body = entity.find_component_by_type(physx.PhysxRigidStaticComponent)
     elif box.prescribed:
         entity = builder.build_kinematic(box.name)
-        body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
     else:
         builder.set_mass_and_inertia(box.mass, sapien.Pose(), box.inertia())
         entity = builder.build(box.name)
-        body = entity.find_component_by_type(physx.PhysxRigidDynamicComponent)
+    kind = physx.PhysxRigidStaticComponent if box.fixed else physx.PhysxRigidDynamicComponent
+    body = entity.find_component_by_type(kind)
     for part in box.parts:
         if isinstance(part, ConvexMesh):
             body.attach(_mesh(part, material, builder.collision_groups))

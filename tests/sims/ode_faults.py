@@ -6,7 +6,6 @@ setting `fault` names the quantity.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import weakref
 from dataclasses import replace
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 from pytest_simbench.sims.ode.adapter import ODE
 from pytest_simbench.sims.ode.contacts import distinct
-from pytest_simbench.sims.ode.library import Mesh, body_id, library, place
+from pytest_simbench.sims.ode.library import Mesh, library, place, set_damping
 
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import lazy_import
@@ -97,21 +96,8 @@ def weightless(name: str) -> Plant:
     return lambda s: part(s, name).body.setGravityMode(False)
 
 
-def aside(s: Any) -> None:
-    part(s, "cube_05").frame = Pose.at(0.01, 0.0, 0.0)
-
-
 def damped(name: str) -> Plant:
-    def plant(s: Any) -> None:
-        tell = library().dBodySetLinearDamping
-        tell.argtypes = [ctypes.c_void_p, ctypes.c_double]
-        tell(body_id(part(s, name).body), 1e-4)
-
-    return plant
-
-
-def step(s: Any) -> None:
-    s.settings = replace(s.settings, timestep=0.003)
+    return lambda s: set_damping(part(s, name).body, np.array([1e-4, 0.0]))
 
 
 def uncoupled(s: Any) -> None:
@@ -120,9 +106,9 @@ def uncoupled(s: Any) -> None:
 
 
 FAULTS: dict[str, Plant] = {
-    "timestep": step,
+    "timestep": lambda s: setattr(s, "settings", replace(s.settings, timestep=0.003)),
     "ground/height": lambda s: part(s, "ground").geoms[0].setParams((0.0, 0.0, 1.0), 0.01),
-    "body/cube_05/com": aside,
+    "body/cube_05/com": lambda s: setattr(part(s, "cube_05"), "frame", Pose.at(0.01, 0.0, 0.0)),
     "body/cube_05/gravity": weightless("cube_05"),
     "body/cube_05/touches": ghost("cube_05"),
     "body/cube_05/dynamic": lambda s: part(s, "cube_05").body.setKinematic(),

@@ -84,9 +84,7 @@ def test_whole_turns_are_counted(worlds: Worlds, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("angle", [-5.5, -3.0, 2.0, 5.5])
-def test_a_wide_joint_may_start_beyond_half_a_turn(
-    worlds: Worlds, tmp_path: Path, angle: float
-) -> None:
+def test_a_wide_joint_may_start_anywhere(worlds: Worlds, tmp_path: Path, angle: float) -> None:
     robot = turning_on(scenes.arm(), tmp_path).with_joints("panda_joint7", initial_position=angle)
     world = worlds.load(scenes.arm_alone(robot))
     assert float(world.joints[0, 6]) == pytest.approx(angle, abs=1e-6)
@@ -191,10 +189,30 @@ def test_joints_of_one_link_are_coupled(worlds: Worlds, other: Part, ratio: floa
     assert following == pytest.approx(ratio * led, abs=3e-3)
 
 
+SLIDE = Part("slide", (1.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.1, 0.0, 0.2), slides=True)
+
+
+def fallen(worlds: Worlds, **held: float) -> FloatArray:
+    """Positions and velocities of a lever that falls, and of a slider on it with this drive."""
+    robot = mechanism("polar", LEVER, SLIDE).with_joints("slide", **held)
+    world = worlds.load(Scene("polar", robot=robot))
+    world.wait(0.3)
+    return world.joints
+
+
+def test_a_slider_that_is_held_on_what_turns_has_no_velocity(worlds: Worlds) -> None:
+    assert fallen(worlds, stiffness=1e6, effort_limit=1e6)[1, 1] == pytest.approx(0.0, abs=0.01)
+
+
+def test_the_rotor_of_a_slider_turns_nothing(worlds: Worlds) -> None:
+    """A heavy one holds the slider, which falls with the lever as one body."""
+    held = fallen(worlds, stiffness=1e6, effort_limit=1e6)
+    np.testing.assert_allclose(fallen(worlds, armature=1e4), held, atol=0.03)
+
+
 def test_joints_of_no_common_link_are_refused(worlds: Worlds) -> None:
-    robot = mechanism(
-        "far", LEVER, ON_LEVER, replace(RACK, on=None), couplings=(Coupling("rack", "lever"),)
-    )
+    far, pair = replace(RACK, on=None), Coupling("rack", "lever")
+    robot = mechanism("far", LEVER, ON_LEVER, far, couplings=(pair,))
     with pytest.raises(EngineFailed, match="rack and lever have none in common"):
         worlds.load(Scene("far", robot=robot))
 
@@ -210,13 +228,18 @@ def test_a_convex_body_may_touch_the_mesh_of_a_link(worlds: Worlds) -> None:
     assert any(name.startswith("link/") for name in touched)
 
 
+def test_no_forces_are_told_of_the_step_in_which_things_fall_asleep(worlds: Worlds) -> None:
+    world = worlds.load(Scene("cube", (scenes.cube("cube", Pose.at(0.4, 0.0, scenes.EDGE / 2)),)))
+    world.wait(1.0)
+    assert (world.contact_count(), world.contact_forces()) == (4, {})
+
+
 def test_slip_is_along_the_surface_whatever_its_direction() -> None:
     def moving(*velocity: float) -> SimpleNamespace:
         return SimpleNamespace(getPointVel=lambda place: velocity)
 
     contact = SimpleNamespace(getContactGeomParams=lambda: ((0, 0, 0), (0, 0, 1), 0.0, None, None))
     assert _slip(contact, moving(0.3, 0.4, 5.0), None) == pytest.approx((0.6, 0.8, 0.0))
-    assert _slip(contact, moving(0.1, 0.0, 0.0), moving(0.4, 0.4, 0.0)) == pytest.approx(
-        (-0.6, -0.8, 0.0)
-    )
+    between = _slip(contact, moving(0.1, 0.0, 0.0), moving(0.4, 0.4, 0.0))
+    assert between == pytest.approx((-0.6, -0.8, 0.0))
     assert _slip(contact, moving(0.0, 0.0, 1.0), None) is None

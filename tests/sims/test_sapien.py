@@ -18,7 +18,7 @@ from pytest_simbench.sims.sapien.bodies import ROBOT, WORLD, groups_apart
 from pytest_simbench.sims.sapien.readback import _compatible
 
 from pytest_simbench.laws.mechanisms import Part, Y, mechanism
-from pytest_simbench.scene import Coupling, FloatArray, Scene
+from pytest_simbench.scene import Box, Coupling, FloatArray, Pose, Scene
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import joints, scenes
@@ -88,15 +88,11 @@ def test_groups_keep_apart_what_the_scene_does(pairs: set[Any], self_collide: bo
     robot = replace(scenes.arm(), self_collide=self_collide)
     scene: Any = SimpleNamespace(apart=pairs, robot=robot)
     found = groups_apart(scene)
+    own = [ROBOT, WORLD | (ROBOT if self_collide else 0), 0, 0]
     for a in PARTS:
         for b in PARTS:
             links = [name.startswith("link/") for name in (a, b)]
-            plain = [
-                [ROBOT, WORLD | (ROBOT if self_collide else 0), 0, 0]
-                if link
-                else [WORLD, WORLD | ROBOT, 0, 0]
-                for link in links
-            ]
+            plain = [own if link else [WORLD, WORLD | ROBOT, 0, 0] for link in links]
             groups = [found.get(name, default) for name, default in zip((a, b), plain, strict=True)]
             meet = (a, b) not in pairs and (b, a) not in pairs and (self_collide or not all(links))
             assert a == b or _compatible(*groups) == meet, (a, b)
@@ -158,6 +154,13 @@ def test_what_was_before_a_restore_leaves_no_trace(
             futures.append((future(simulator, 100), simulator.joint_state()))
     assert np.array_equal(futures[0][0], futures[1][0])
     assert np.array_equal(futures[0][1], futures[1][1])
+
+
+def test_a_restored_belt_has_its_velocity() -> None:
+    belt = Box("belt", (1.0, 0.4, 0.1), Pose(), prescribed=True, linear_velocity=(0.3, 0.0, 0.0))
+    with world(Scene("belt", (belt,))) as simulator:
+        simulator.restore(simulator.save())
+        assert simulator.body_state()[0, 7:] == pytest.approx(belt.velocity)
 
 
 def test_bodies_are_read_in_one_call_as_each_tells_itself() -> None:

@@ -16,7 +16,7 @@ from pytest_simbench.tasks import Carrying, Holding, Jitter, Nesting, Settling, 
 from pytest_simbench.tasks.resting import spread
 from pytest_simbench.tasks.settling import deepest, kinetic_energy, tilted
 from tests.conftest import performed
-from tests.tasks.scripted import Mishap, move, perform
+from tests.tasks.scripted import Mishap, ScriptedProcess, move, perform
 from tests.tasks.scripted_scene import ROBOT, Moved
 
 NONE = Jitter(0.0, 0.0)
@@ -86,11 +86,7 @@ def test_repetitions_go_through_starts_which_are_in_the_file_s_frames() -> None:
     ("scene", "premises", "message"),
     [
         (Scene("empty"), [], "has nothing that moves"),
-        (
-            SCENE,
-            [rests_on("chair", "slab")],
-            "'chair', which is no free body .* has slab, stool",
-        ),
+        (SCENE, [rests_on("chair", "slab")], "'chair', which is no free body .* has slab, stool"),
     ],
 )
 def test_what_it_cannot_do_is_one_sentence(scene: Scene, premises: list[Any], message: str) -> None:
@@ -132,6 +128,12 @@ class Restless(Moved):
     def do_contact_forces(self) -> list[Any]:
         self.velocities["slab"][0] = 0.03
         return [("body/slab", "ground", np.array([0, 0, 20 + (-1) ** len(self.asked), 0, 0, 0]))]
+
+
+def test_what_falls_asleep_is_held_by_the_forces_of_before() -> None:
+    process, told = ScriptedProcess(), [("body/slab", "ground", np.array([0, 0, 10.0, 0, 0, 0]))]
+    process.do_contact_forces = lambda: [told.pop()] if told else []  # type: ignore[attr-defined]
+    assert perform(Settling(SCENE), process=process)[0].metrics["force_jitter"] == 0.0
 
 
 def test_the_whole_score_of_what_ends_elsewhere() -> None:
