@@ -85,7 +85,11 @@ PUSH = (1.0, 0.0, 0.0)
         (Wrench(force=PUSH), (), 2),
         (
             Wrench(),
-            (Box("belt", (1.0, 1.0, 0.1), Pose(), prescribed=True, linear_velocity=PUSH),),
+            (
+                Box(
+                    "belt", (1.0, 1.0, 0.1), Pose.at(0, 0, 1), prescribed=True, linear_velocity=PUSH
+                ),
+            ),
             60,
         ),
     ],
