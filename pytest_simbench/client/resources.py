@@ -107,11 +107,14 @@ class ResourceUse:
 
 @dataclass
 class _Tree:
-    """A process and its children; Process objects are kept, since CPU % is between two looks."""
+    """A process and its children. CPU time is also that of children that have ended, which the
+    kernel adds to who waited for them."""
 
     root: psutil.Process
     members: dict[int, psutil.Process] = field(default_factory=dict)
     listed: float = float("-inf")
+    looked: float = float("-inf")
+    used: float = 0.0
 
     def look(self, now: float) -> tuple[float, float]:
         """CPU [% of a core] since the last look and RSS [MB] of all that live.
@@ -121,16 +124,12 @@ class _Tree:
         """
         if now - self.listed >= LISTING_INTERVAL:
             self.listed = now
-            found = {self.root.pid: self.root}
-            for child in self.root.children(recursive=True):
-                known = self.members.get(child.pid)
-                found[child.pid] = known if known == child else child
-            self.members = found
-        cpu = rss = 0.0
+            self.members = {p.pid: p for p in (self.root, *self.root.children(recursive=True))}
+        used = rss = 0.0
         for process in list(self.members.values()):
             try:
                 with process.oneshot():
-                    percent = process.cpu_percent()  # 0 at the first look at a process
+                    seconds = sum(process.cpu_times()[:4])  # user, system, and of its children
                     size = process.memory_info().rss
             except (psutil.NoSuchProcess, psutil.AccessDenied):
                 if process is self.root:
@@ -139,9 +138,11 @@ class _Tree:
                 continue
             if process is self.root and size == 0:  # ended, and not yet waited for
                 raise psutil.NoSuchProcess(process.pid)
-            cpu += percent
+            used += seconds
             rss += size / MB
-        return cpu, rss
+        percent = max(0.0, 100 * (used - self.used) / (now - self.looked))  # 0 at the first look
+        self.looked, self.used = now, used
+        return percent, rss
 
 
 class ResourceSampler:

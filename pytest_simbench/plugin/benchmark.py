@@ -46,10 +46,13 @@ def has_benchmark(plugins: pytest.PytestPluginManager) -> bool:
 
 
 def time_by_workers(plugins: pytest.PytestPluginManager, items: Iterable[pytest.Item]) -> None:
-    """Have pytest-benchmark, where it is at work, take the workers' seconds as its time."""
+    """Have pytest-benchmark, where it is at work, take the workers' seconds as its time. It reads
+    the closest mark alone, so what a mark of the test says goes into ours."""
     for item in items if has_benchmark(plugins) else ():
-        group = item.name.partition("[")[0]
-        item.add_marker(pytest.mark.benchmark(timer=worker_clock, group=group))
+        own = item.get_closest_marker("benchmark")
+        options = {"group": item.name.partition("[")[0], **(own.kwargs if own else {})}
+        mark = pytest.mark.benchmark(**{**options, "timer": worker_clock})
+        item.add_marker(mark, append=False)
 
 
 def shown(config: pytest.Config, groups: Sequence[Group]) -> Sequence[Group]:

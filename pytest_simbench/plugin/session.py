@@ -255,11 +255,19 @@ class SimSession:
 
         return shown(self.config, (yield))
 
-    @pytest.hookimpl(trylast=True)  # what is printed last is read first
-    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+    @pytest.hookimpl(wrapper=True, trylast=True)  # what is printed last is read first
+    def pytest_terminal_summary(
+        self, terminalreporter: pytest.TerminalReporter
+    ) -> Generator[None, Any, Any]:
+        """Tell the result, also where `--benchmark-compare-fail` raises."""
+        try:
+            return (yield)
+        finally:
+            if not self.in_worker:  # an xdist worker has a reporter too, which nobody reads
+                self._summarise(terminalreporter)
+
+    def _summarise(self, terminalreporter: pytest.TerminalReporter) -> None:
         """Print the result, write the report, and say last where it is."""
-        if self.in_worker:  # an xdist worker has a reporter too, which nobody reads
-            return
         if self.begun:
             if self._exit_status == pytest.ExitCode.INTERRUPTED:
                 self.run.tell_how_to_go_on()

@@ -4,7 +4,8 @@ What moved in the last second is carried on to the end of the wait: as fast, fas
 it grew since the second before, and with a margin. The wait ends early when with all of that no
 body could lose its support and no count could change. A body that falls, rolls, turns or creeps
 keeps it running. A body that creeps back after it has nearly stood still for a second is not
-foreseen: 1 mm out and, over nine seconds, 0.8 mm back.
+foreseen: 1 mm out and, over nine seconds, 0.8 mm back. What the scene does by itself is: a body
+that moves as prescribed, and a force that starts or ends.
 """
 
 from __future__ import annotations
@@ -67,11 +68,20 @@ def settle(
     ends = [] if full else np.arange(WINDOW, seconds - WINDOW / 2, WINDOW).tolist()
     for end in [*ends, seconds]:
         parts.append(world.wait(max(0.0, began + end - world.time), log_period=SAMPLING))
-        if len(parts) > 1 and end < seconds:
+        since = world.time - 2 * WINDOW
+        if len(parts) > 1 and end < seconds and not _acts(world.scene, since, began + seconds):
             bound = _bound(world.scene, parts, seconds - end, slacks)
             if bound is not None:
                 return Motion.joined(parts), Wait(world.time - began, seconds, *bound)
     return Motion.joined(parts), Wait(world.time - began, seconds)
+
+
+def _acts(scene: Scene, since: float, until: float) -> bool:
+    """Whether a body moves as prescribed, or a force starts or ends between two times [s]."""
+    wrenches = [wrench for body in scene.bodies for wrench in body.wrenches]
+    return any(body.velocity.any() for body in scene.prescribed_bodies) or any(
+        since < time < until for wrench in wrenches for time in (wrench.start, wrench.end)
+    )
 
 
 def _bound(

@@ -155,7 +155,10 @@ class Search:
             return trial.suggest_int(one.name, int(one.over.low), int(one.over.high), log=log)
         value = f"{trial.suggest_float(one.name, one.over.low, one.over.high, log=log):.4g}"
         own = own_values(self.space, self.base).get(one.name)  # 1/240 as it is
-        return own if own is not None and f"{own:.4g}" == value else float(value)
+        if own is not None and f"{own:.4g}" == value:
+            return own
+        period = self.trials.target.period if one.name == "timestep" else 0.0
+        return period / max(1, round(period / float(value))) or float(value)
 
     def _first(self) -> list[dict[str, Any]]:
         """Today's values, and each with one changed: half-way to either end of its range on its

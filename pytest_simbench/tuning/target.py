@@ -19,6 +19,7 @@ from pytest_simbench.measure.verdicts import Bound
 from pytest_simbench.records.metrics import COSTS, Metric, UnknownMetric
 from pytest_simbench.records.phenomena import PHENOMENA
 from pytest_simbench.records.record import Record
+from pytest_simbench.scene.policy import Policy
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks.base import Task
 from pytest_simbench.tasks.measured import MeasuredTask
@@ -109,6 +110,12 @@ class Target:
         if self.metric is None:
             return "limits" if self.claims else "tolerances"
         return "" if self.metric.bounded else self.metric.unit
+
+    @property
+    def period(self) -> float:
+        """Of the policy, a multiple of any time step [s]; 0 without a policy."""
+        policy = getattr(self.chosen[0].task, "policy", None)
+        return 1 / getattr(policy, "rate", Policy.rate) if policy else 0.0
 
     @property
     def word(self) -> str:

@@ -16,6 +16,7 @@ from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.laws import Law
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
+from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tuning.target import CONVERGED, FINER, FIRST_CHOSEN, Look, Target, TuningError
 
 CHEAPER = 0.9
@@ -65,7 +66,7 @@ class Runs:
                 repeater.run(missing)
             except Unavailable as error:
                 raise TuningError(error.what) from None
-            except WorkerError:  # another world than was asked for: its record tells
+            except (WorkerError, LoopError):  # another world, a step that is none: its record tells
                 pass
             made = [r for r in self.folder.own[before:] if r.status != "interrupted"]
             kept |= {record.repetition: record for record in made}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pytest_simbench.description.robot_files import description_xml, keep
+from pytest_simbench.description.robot_files import content_of, description_xml, keep
 from pytest_simbench.description.urdf import INERTIA, PreparedRobot
 from pytest_simbench.scene import Robot, Scene, Start
 from pytest_simbench.scene.pose import vector3
@@ -163,13 +163,14 @@ def _changed(scene: Scene, kind: str, name: str, value: float) -> Scene:
 
 def _heavy(robot: Robot, link: str, mass: float) -> Robot:
     """With another mass of a link; its inertia changes as much."""
-    xml = description_xml(robot)
+    kept = content_of(robot)
+    xml = ET.fromstring(kept["urdf"])
     inertial = dict(_inertials(xml))[link]
     factor = mass / float(inertial.find("mass").get("value"))  # type: ignore
     for element in inertial:
         for key in {"value", *INERTIA} & {*element.keys()}:
             element.set(key, repr(factor * float(element.get(key, 0))))
-    return replace(robot, urdf=str(keep(xml)), packages={})
+    return replace(robot, urdf=str(keep(xml, kept["meshes"])), packages={})
 
 
 def _inertials(xml: ET.Element) -> Iterator[tuple[str, ET.Element]]:

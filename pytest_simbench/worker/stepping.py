@@ -196,7 +196,8 @@ class Stepper:
         """Advance by `steps`; a log sample every `log_period` [s] (0: every step; None: no log).
 
         A loop is asked for more rows after each of its periods, and may end it all. Looking and
-        asking do not stop the clocks, which takes longer: what they took is taken out.
+        asking do not stop the clocks, which takes longer: what they took is taken out, and what
+        asking took in other threads and processes too, as of a policy or a renderer.
 
         Returns:
             The log: time (n,), joints (n, 2, n_joints), bodies (n, n_free, 13); {} where there is
@@ -238,7 +239,8 @@ class Stepper:
             checks = k % check_every == 0 or k in (steps, due)
             films = film_every and (totals.steps + k) % film_every == 0
             if logs or asks or checks:
-                paused, waits, cpu = time.perf_counter(), clock.waited(), time.thread_time()
+                spent = family.cpu if asks else time.thread_time
+                paused, waits, cpu = time.perf_counter(), clock.waited(), spent()
                 now = states.time_after(k, from_time)
                 joints, bodies = states.joints(), states.bodies()
                 if logs:
@@ -250,7 +252,7 @@ class Stepper:
                     due = watch.due - from_start
                 if loop is not None and asks and not loop.ask(now, joints, bodies):
                     steps = k
-                aside_cpu += time.thread_time() - cpu
+                aside_cpu += spent() - cpu
                 aside_waited += clock.waited() - waits
                 aside += time.perf_counter() - paused
             if not (checks or films or k % look_every == 0 or k == steps):

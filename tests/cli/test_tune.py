@@ -200,7 +200,7 @@ stacking --sim mujoco --jobs 2 --cluster tcp://127.0.0.1:1;
 stacking --sim mujoco,drake --settings condim; stacking --sim mujoko;
 stacking --sim mujoco --settings condim; stacking --sim mujoco --budget 0s;
 stacking --sim mujoco --profile tuned,real; stacking --sim mujoco --profile no.toml;
-stacking --sim mujoco --profile best"""
+stacking --sim mujoco --profile best; stacking --sim mujoco --output /dev/null"""
 
 
 @pytest.mark.parametrize("words", re.split(r";\s", WRONG))

@@ -181,28 +181,23 @@ def test_the_wire_form_is_that_of_the_record() -> None:
 
 
 class Process:
-    """A process as psutil shows it; children are new objects at each listing, equal by pid."""
+    """A process as psutil shows it; children are new objects at each listing."""
+
+    now = 0.0
 
     def __init__(self, pid: int, percent: float, rss: int, *children: Process) -> None:
         self.pid, self.percent, self.rss, self.direct = pid, percent, rss, list(children)
         self.gone = False
-        self.looks = self.listings = 0
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Process) and other.pid == self.pid
-
-    def __hash__(self) -> int:
-        return self.pid
+        self.listings, self.ended = 0, 0.0
 
     @contextmanager
     def oneshot(self) -> Iterator[None]:
         yield
 
-    def cpu_percent(self) -> float:
+    def cpu_times(self) -> tuple[float, ...]:
         if self.gone:
             raise psutil.NoSuchProcess(self.pid)
-        self.looks += 1
-        return 0.0 if self.looks == 1 else self.percent  # psutil: between two looks at one object
+        return self.percent / 100 * Process.now, 0.0, self.ended, 0.0
 
     def memory_info(self) -> SimpleNamespace:
         return SimpleNamespace(rss=self.rss)
@@ -217,42 +212,42 @@ class Process:
         )
 
 
-def tree(root: Process) -> _Tree:
-    return _Tree(root)
+def look(tree: _Tree, now: float) -> tuple[float, float]:
+    Process.now = now
+    return tree.look(now)
 
 
 def test_a_tree_is_the_sum_of_all_generations() -> None:
-    found = tree(
+    found = _Tree(
         Process(1, 10.0, 1_000_000, Process(2, 20.0, 2_000_000, Process(3, 40.0, 4_000_000)))
     )
-    assert found.look(0.0) == (0.0, pytest.approx(7.0))
-    assert found.look(0.1) == (pytest.approx(70.0), pytest.approx(7.0))
+    assert look(found, 0.0) == (0.0, pytest.approx(7.0))
+    assert look(found, 0.1) == (pytest.approx(70.0), pytest.approx(7.0))
 
 
-def test_children_are_listed_once_a_second_and_known_again() -> None:
-    """A process seen anew has no CPU % yet: its object must be kept from listing to listing."""
+def test_children_are_listed_once_a_second() -> None:
     root = Process(1, 10.0, 1_000_000, Process(2, 20.0, 2_000_000))
-    found = tree(root)
+    found = _Tree(root)
     for now, listings in ((0.0, 1), (0.5, 1), (LISTING_INTERVAL, 2), (1.9, 2), (2.1, 3)):
-        cpu, _ = found.look(now)
+        cpu, _ = look(found, now)
         assert root.listings == listings
-        assert cpu == (0.0 if now == 0.0 else 30.0)
+        assert cpu == (0.0 if now == 0.0 else pytest.approx(30.0))
 
 
-def test_another_process_with_the_pid_of_a_dead_one_is_a_new_one() -> None:
-    root = Process(1, 10.0, 1_000_000, Process(2, 20.0, 2_000_000))
-    found = tree(root)
-    found.look(0.0)
-    found.members[2].pid = 7  # not the process it was
-    assert found.look(LISTING_INTERVAL)[0] == 10.0
+def test_a_child_that_nobody_saw_counts_once_it_has_ended() -> None:
+    root = Process(1, 10.0, 1_000_000)
+    found = _Tree(root)
+    look(found, 0.0)
+    root.ended = 0.2
+    assert [look(found, now)[0] for now in (0.5, 1.0)] == pytest.approx([50.0, 10.0])
 
 
 def test_a_child_that_is_gone_is_left_out_and_the_others_counted() -> None:
     kids = [Process(n, 20.0, 2_000_000) for n in (2, 3, 4)]
-    found = tree(Process(1, 10.0, 1_000_000, *kids))
-    found.look(0.0)
+    found = _Tree(Process(1, 10.0, 1_000_000, *kids))
+    look(found, 0.0)
     found.members[2].gone = True
-    assert found.look(0.1) == (50.0, 5.0)
+    assert look(found, 0.1) == (pytest.approx(50.0), 5.0)
     assert list(found.members) == [1, 3, 4]
 
 
@@ -261,7 +256,7 @@ def test_a_root_that_has_ended_ends_the_sampling_and_is_named(end: str) -> None:
     root = Process(17, 10.0, 0 if end == "zombie" else 1_000_000)
     root.gone = end == "gone"
     with pytest.raises(psutil.NoSuchProcess) as caught:
-        tree(root).look(0.0)
+        _Tree(root).look(0.0)
     assert caught.value.pid == 17
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -76,6 +77,19 @@ def test_a_worse_run_fails_with_one_sentence(
     assert "- FAILED test\\_falling\\[mujoco-headless\\]: landed fell from 100 % to 0 %" in written
     assert "| test\\_falling\\[mujoco-headless\\] | landed | 100 % | 0 % |" in written
     assert written.count("## falling: 5 repetitions") == 1
+
+
+def test_a_regression_that_pytest_benchmark_raises_hides_nothing(
+    pytester: pytest.Pytester, baseline: Path
+) -> None:
+    (faster,) = baseline.glob(".benchmarks/*/*.json")
+    faster.write_text(re.sub(r'"min": [^,]*', '"min": 1e-9', faster.read_text()))
+    words = f"{ARGUMENTS} --sim-output=now --benchmark-compare --benchmark-compare-fail=min:1%"
+    result = pytester.runpytest_subprocess(*words.split())
+    output = result.stdout.str()
+    assert "Performance has regressed" in result.stderr.str()
+    assert output.index("comparison with the baseline") < output.index("report: now/report.html")
+    assert (baseline / "now" / "outcome.json").is_file()
 
 
 def test_a_first_task_that_never_finishes_hides_no_other_one(pytester: pytest.Pytester) -> None:

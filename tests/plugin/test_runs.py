@@ -94,13 +94,14 @@ def test_a_mark_stands_between_the_command_line_and_the_ini_file(
 
 
 def test_benchmark_rounds_are_worker_seconds_and_compare(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(CLAIMING)
+    mark = '@pytest.mark.benchmark(group="mine")\ndef'
+    pytester.makepyfile("import pytest\n" + CLAIMING.replace("def", mark))
     arguments = ["--sim=mujoco", "--reps=3", "--benchmark-autosave"]
     run_pytest(pytester, "--benchmark-json=b.json --sim-output=out", *arguments, passed=1)
     (benchmark,) = json.loads((pytester.path / "b.json").read_text())["benchmarks"]
     kept = records(pytester.path / "out")
     seconds = [r["stepping"]["wall"] for r in kept]
-    assert benchmark["stats"]["rounds"] == 3
+    assert (benchmark["stats"]["rounds"], benchmark["group"]) == (3, "mine")
     assert benchmark["stats"]["min"] == pytest.approx(min(seconds))
     assert benchmark["stats"]["max"] == pytest.approx(max(seconds))
     assert benchmark["extra_info"]["metrics"] == {"landed": [1.0, 1.0, 1.0]}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.records.notes import Wait
-from pytest_simbench.scene import FloatArray, Pose, Scene
+from pytest_simbench.scene import Body, Box, FloatArray, Pose, Scene, Wrench
 from pytest_simbench.tasks.base import cube
 from pytest_simbench.tasks.waiting import MARGIN, Slack, carried_on, settle
 
@@ -72,6 +73,33 @@ def waited(
 
 def test_what_is_still_is_waited_for_two_seconds() -> None:
     assert waited(Gliding())[0] == Wait(pytest.approx(2.0), 60.0, "support of a", 1e-6, SUPPORT)
+
+
+PUSH = (1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("wrench", "belt", "seconds"),
+    [
+        (Wrench(force=PUSH, start=50.0, end=50.5), (), 40),
+        (Wrench(force=PUSH), (), 2),
+        (
+            Wrench(),
+            (
+                Box(
+                    "belt", (1.0, 1.0, 0.1), Pose.at(0, 0, 1), prescribed=True, linear_velocity=PUSH
+                ),
+            ),
+            60,
+        ),
+    ],
+)
+def test_what_is_still_to_act_is_waited_for(
+    wrench: Wrench, belt: tuple[Body, ...], seconds: float
+) -> None:
+    world, (a, b) = Gliding(), SCENE.bodies
+    world.scene = Scene("pushed", (replace(a, wrenches=(wrench,)), b, *belt))
+    assert waited(world)[0].seconds == pytest.approx(seconds)
 
 
 def test_the_nearest_count_is_told() -> None:

@@ -10,9 +10,11 @@ from typing import Any
 import pytest
 
 from pytest_simbench.records.folder import RECORDS
+from pytest_simbench.scene.policy import Policy, Rhythm
 from pytest_simbench.simulator.registry import adapter, address
+from pytest_simbench.tasks import Reaching
 from pytest_simbench.tuning.search import Search, front, space_of
-from pytest_simbench.tuning.target import FAILED, TuningError
+from pytest_simbench.tuning.target import FAILED, Look, TuningError
 from pytest_simbench.tuning.trials import Candidate
 
 from .made_up import Score, Scored, trials
@@ -88,6 +90,15 @@ def test_todays_own_step_is_no_candidate_beside_it(tmp_path: Path) -> None:
     one = Search(looks, base, space_of(base, ["timestep"], "pybullet"), 1, lambda one, best: None)
     one.run(1e9, 2)
     assert {variant for variant, _ in executor.asked} == {"today", "trial1"}
+
+
+def test_steps_for_a_policy_divide_its_period(tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    one, _ = search(tmp_path, over="timestep")
+    looks = (Look(Reaching(lambda seen: None), 1),)
+    one.trials.target = replace(one.trials.target, chosen=looks)
+    for found in one.run(1e9, 8)[1:]:
+        assert Rhythm(Policy.rate).steps(found.changes["timestep"])
 
 
 def test_a_setting_that_does_not_act_is_not_asked_for(tmp_path: Path) -> None:

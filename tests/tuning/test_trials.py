@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.records.record import Failure
+from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tuning.target import TuningError
 
 from .made_up import target, trials
@@ -39,6 +41,14 @@ def test_failures_that_today_has_too_end_nothing(tmp_path: Path) -> None:
     looks, _ = trials(tmp_path, lambda s, k: None if k == 2 else 1.0)
     found = looks.choose("trial1", {"timestep": 0.004}, [looks.today()])
     assert (found.ended, looks.error(found)) == ("", 0.25)
+
+
+def test_a_step_that_divides_no_period_fails_that_candidate_alone(tmp_path: Path) -> None:
+    looks, executor = trials(tmp_path, lambda s, k: 1.0)
+    today, error = looks.today(), LoopError("no multiple of the time step")
+    told = {"status": "failed", "error": Failure("LoopError", str(error), "")}
+    executor.end = lambda experiment, number: (told, error)
+    assert looks.choose("trial1", {"timestep": 0.003}, [today]).ended == "failed: LoopError"
 
 
 @pytest.mark.parametrize("jobs", [1, 3, 16])

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pytest_simbench.description.urdf import PreparedRobot
-from pytest_simbench.scene import Box, Pose, Start, Trajectory, Wrench
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.scene import Box, Pose, Scene, Start, Trajectory, Wrench
 from pytest_simbench.tasks import Log
 from pytest_simbench.tuning.target import TuningError
 from pytest_simbench.tuning.unknowns import Unknown, begun, changed, known, starts, unknowns
@@ -34,6 +35,11 @@ def test_the_inertia_changes_with_the_mass() -> None:
     (door,) = [link for link in PreparedRobot(after.robot).links.values() if link.name == "door"]
     assert door.mass == pytest.approx(3.0)
     assert door.inertia == pytest.approx(3 * np.eye(3))
+
+
+def test_a_link_of_meshes_can_be_heavier() -> None:
+    after = changed(Scene("arm", (), panda()), {"mass:panda_link7": 1.5})
+    assert known(after)["mass:panda_link7"] == 1.5
 
 
 def test_what_a_file_says_of_gravity_and_damping_goes_with_the_mass() -> None:
