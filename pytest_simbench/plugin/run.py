@@ -148,7 +148,7 @@ class Run:
     def executor(self) -> Executor:
         """Where repetitions are carried out."""
         if cluster.asked(self.config):
-            return ClusterExecutor(cluster.pool(self.config))
+            return ClusterExecutor(cluster.pool(self.config), self.tell)
         jobs = options.value(self.config, "sim_jobs")
         slots = (self._shared_by or {}).get("simbench_slots", "")
         return LocalExecutor(jobs, expected=self.expected(), slots=slots)
