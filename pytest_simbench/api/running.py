@@ -195,7 +195,7 @@ def _experiments(
 
 def _locked(folder: str | Path | None, resume: bool) -> RunFolder:
     """The folder of the run, this process's own; complains of one that holds another run."""
-    path = None if folder is None else Path(folder)
+    path = Path(folder) if folder else None  # empty: the default, as on pytest's command line
     with refusing((FolderError, NotResumed)):
         found = run_to_resume(path, Path(RUNS)) if resume else path or new_name(Path(RUNS))
         place = RunFolder(found)

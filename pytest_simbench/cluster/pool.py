@@ -60,6 +60,9 @@ class Pool:
     Args:
         address: of the scheduler: `tcp://head:8786`, `tls://head:8786`.
 
+    Attributes:
+        began: versions of the simulators with which the run began, by name.
+
     Raises:
         ExecutorError: no scheduler answers there, or Dask is not installed.
     """
@@ -97,6 +100,7 @@ class Pool:
         self.name = uuid4().hex
         self.call: Callable[[Packed, int], dict[str, Any]] = node_side.run
         self._ready = threading.Condition()
+        self.began: dict[str, str] = {}
         self._known: Mapping[str, Node] = {}
         self._others: Mapping[str, int] = {}
         self._mine: dict[str, str] = {}
@@ -156,6 +160,7 @@ class Pool:
             if node is not None and not silent and address not in self._gone:
                 found[address] = node
         self._known = found
+        self.began = self.began or {k: v for n in found.values() for k, v in n.versions.items()}
         self._seen = {address: self._seen[address] for address in workers}
         self._others = {
             address: sum(key not in self._mine for key in keys)

@@ -16,7 +16,7 @@ from pytest_simbench.records.configuration import (
     task_parameters,
 )
 from pytest_simbench.records.description import TaskDescription
-from pytest_simbench.records.folder import RECORDS, RunFolder
+from pytest_simbench.records.folder import RECORDS, TASKS, RunContents, RunFolder
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import configurations, grouped, short
 
@@ -27,18 +27,18 @@ def run_to_resume(folder: Path | None, runs: Path) -> Path:
     Raises:
         NotResumed: there is none.
     """
-    if folder is not None:
-        found, where = [folder / RECORDS], f"{folder} (it has no {RECORDS})"
-    else:
-        found, where = sorted(runs.glob(f"[0-9]*/{RECORDS}"), key=_begun), f"{runs}"
-    if not found or not found[-1].is_file():
+    folders = [*runs.glob("[0-9]*")] if folder is None else [folder]
+    # One that was killed in its first repetition has only said what it repeats.
+    found = [f for path in folders for f in (path / RECORDS, path / TASKS) if f.is_file()]
+    if not found:
+        where = f"{folder} (it has no {RECORDS})" if folder else runs
         raise NotResumed(f"there is no run to resume in {where}; name the folder of a run")
-    return found[-1].parent
+    return max(found, key=_begun).parent
 
 
-def _begun(records: Path) -> tuple[str, float]:
+def _begun(file: Path) -> tuple[str, float]:
     """When a run began, by its folder's name; of one second, the one written to last."""
-    return records.parent.name[: len("2026-07-01_12-00-00")], records.stat().st_mtime
+    return file.parent.name[: len("2026-07-01_12-00-00")], file.stat().st_mtime
 
 
 class NotResumed(Exception):
@@ -59,7 +59,7 @@ class Resumed:
 
     def __init__(self, folder: RunFolder) -> None:
         self.folder = folder
-        reading = folder.read()
+        reading = folder.read() if folder.holds_run else RunContents()
         self.records = reading.every
         self.tasks = reading.tasks
         last = {claim.identity: claim for claim in reading.claims if claim.verdict}

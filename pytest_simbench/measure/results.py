@@ -130,8 +130,12 @@ class ResultSet:
         return found
 
     def value(self, record: Record, name: str | Metric) -> float | None:
-        """What a record counts with at a metric; None where it has no value."""
-        found = record.value(self.metric(name))
+        """What a record counts with at a metric; None where it has no value. A crashed one has none
+        of what the finished ones lack: other tests of the task measure it."""
+        metric = self.metric(name)
+        found = record.value(metric)
+        if not record.ok and self.ok and metric.name in self.metrics:
+            found = found if any(metric.name in ended.metrics for ended in self.ok) else None
         return None if found is None else float(found)
 
     def values(self, name: str | Metric) -> list[float]:

@@ -61,6 +61,11 @@ def _is_fixture(thing: object) -> bool:
 @pytest.fixture(scope="session")
 def sim_case(request: pytest.FixtureRequest) -> Variant:
     """What the test is made for: simulator, mode, profile and time step."""
+    if not hasattr(request, "param"):
+        arguments.refuse(
+            "a fixture of a simulator was asked for by a TestCase, a doctest or request."
+            "getfixturevalue(): take it as an argument of a test function or method"
+        )
     found: Variant = request.param
     return found
 

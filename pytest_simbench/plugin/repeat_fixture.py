@@ -30,7 +30,7 @@ from pytest_simbench.plugin.run import Run
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.configuration import task_parameters, text
-from pytest_simbench.records.description import TaskDescription
+from pytest_simbench.records.description import TaskDescription, by_task
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record, RecordError, plain
 from pytest_simbench.scene.policy import LoopError
@@ -38,7 +38,7 @@ from pytest_simbench.tasks.base import Task
 
 __tracebackhide__ = True  # a mistake in a task is told at its own line
 
-REFUSALS = (NotResumed, ExecutorError)
+REFUSALS = (NotResumed, ExecutorError, RecordError)
 """Errors whose sentences fail the test."""
 
 
@@ -51,7 +51,7 @@ class RepeatFixture:
         self.run = run
         self.known: list[tuple[str, ...]] = []
         self.results: list[ResultSet] = []
-        self.described: dict[str, TaskDescription] = {}
+        self.described: list[TaskDescription] = []
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say.
@@ -74,8 +74,8 @@ class RepeatFixture:
         experiment = experiment.in_case(attempt=self.run.begin(experiment))
         with failing(REFUSALS):
             found = self.run.take(experiment, wanted if isinstance(wanted, int) else None)
-        self.run.describe(experiment.task)
-        self.described[experiment.task.name] = TaskDescription.of(experiment.task)
+            self.run.describe(experiment.task)
+        self.described.append(TaskDescription.of(experiment.task))
 
         run = self.run
         repeater = Repeater(
@@ -83,7 +83,7 @@ class RepeatFixture:
         )
 
         def up_to(number: int) -> list[Record]:
-            with failing((*REFUSALS, LoopError, RecordError)):
+            with failing((*REFUSALS, LoopError)):
                 return repeater.up_to(number, found)
 
         metrics = experiment.task.metrics
@@ -124,7 +124,7 @@ class RepeatFixture:
                 title = in_one_line(f"{which}claim {metric.name} {judgement.claim}")
                 self.node.user_properties.append((title, claim.verdict))
         if self.results and benchmark is not None:
-            give_rounds(benchmark, self.results, self.described.values())
+            give_rounds(benchmark, self.results, by_task(self.described).values())
 
 
 def claim_of(case: Case, result: ResultSet, metric: Metric, judgement: Judgement) -> Claim:

@@ -124,28 +124,22 @@ class Run:
             self.told |= dict.fromkeys(self.resumed.repair(), False)
         elif self.folder.holds_run:
             self.folder.release()
-            raise pytest.UsageError(self.occupied())
+            raise pytest.UsageError(
+                f"{self.folder.path} already holds a run; complete that one with --sim-resume="
+                f"{self.folder.path}, or give another --sim-output"
+            )
 
-    def occupied(self) -> str:
-        """That the folder holds another run, as a sentence with what to do; empty if it does not.
-
-        For xdist's controller, which does not know whether any test needs the folder.
-        """
-        folder = self.folder
-        if folder.locked or self.resumed is not None or not folder.holds_run:
-            return ""
-        return (
-            f"{folder.path} already holds a run; complete that one with --sim-resume="
-            f"{folder.path}, or give another --sim-output"
-        )
-
-    def use(self) -> Path:
-        """The folder, for a test that writes to it; the test fails where it cannot be used."""
+    def reserve(self) -> None:
+        """Lock the folder, or keep in `problem` why it cannot be used."""
         if not self.problem:
             try:
                 self.lock()
             except pytest.UsageError as error:
                 self.problem = str(error)
+
+    def use(self) -> Path:
+        """The folder, for a test that writes to it; the test fails where it cannot be used."""
+        self.reserve()
         if self.problem:
             pytest.fail(self.problem, pytrace=False)
         return self.folder.path
@@ -154,7 +148,7 @@ class Run:
     def executor(self) -> Executor:
         """Where repetitions are carried out."""
         if cluster.asked(self.config):
-            return ClusterExecutor(cluster.pool(self.config))
+            return ClusterExecutor(cluster.pool(self.config), self.tell)
         jobs = options.value(self.config, "sim_jobs")
         slots = (self._shared_by or {}).get("simbench_slots", "")
         return LocalExecutor(jobs, expected=self.expected(), slots=slots)

@@ -22,6 +22,9 @@ NAMING = ("sim_name", "sim_robot", "sim_profile", "sim_set", "sim_python", "sim_
 """Options whose values name simulators or robots: they are held against what is registered, which
 takes imports."""
 
+NAMED = ("sim_output", "sim_resume", "sim_history")
+"""Options that name the run folder; without them it is a new one, which no other run has."""
+
 
 class SimSession:
     """One pytest process, from its options to its summary. Also a plugin: most of pytest's hooks
@@ -191,7 +194,8 @@ class SimSession:
         run = self.run
         if run.slots is not None:
             node.workerinput["simbench_slots"] = run.slots.address
-        run.problem = run.problem or run.occupied()
+        if options.mentioned(self.config, NAMED):  # two runs may begin there at once
+            run.reserve()
         node.workerinput["simbench_folder"] = str(run.folder.path.absolute())
         node.workerinput["simbench_problem"] = run.problem
 

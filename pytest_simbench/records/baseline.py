@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pytest_simbench.records.checked import CheckError
-from pytest_simbench.records.description import TaskDescription
+from pytest_simbench.records.description import TaskDescription, by_task
 from pytest_simbench.records.folder import RECORDS, RunContents, RunFolder
 from pytest_simbench.records.record import SCHEMA, Record, RecordError
 from pytest_simbench.records.series import settled
@@ -73,7 +73,7 @@ def from_benchmarks(saved: Mapping[str, Any], name: str) -> RunContents:
     if not isinstance(benchmarks, list):
         raise BaselineError(f"the baseline {name} is malformed: 'benchmarks' is not a list")
     records: list[Record] = []
-    tasks: dict[str, TaskDescription] = {}
+    tasks: list[TaskDescription] = []
     problems: list[str] = []
     for benchmark in benchmarks:
         extra = benchmark.get("extra_info") if isinstance(benchmark, Mapping) else None
@@ -82,7 +82,7 @@ def from_benchmarks(saved: Mapping[str, Any], name: str) -> RunContents:
         where = f"{name}, {benchmark.get('fullname', 'a benchmark without a name')}"
         try:
             records += from_extra_info(extra[KEY], where)
-            tasks |= _tasks(extra[KEY], where, problems)
+            tasks += _tasks(extra[KEY], where, problems)
         except RecordError as error:
             raise BaselineError(f"the baseline cannot be read: {error}; give {FORMS}") from None
     if not records:
@@ -90,20 +90,18 @@ def from_benchmarks(saved: Mapping[str, Any], name: str) -> RunContents:
             f"the baseline {name} holds no repetition of a simulator that this version can "
             f"compare; give {FORMS}"
         )
-    return RunContents(name, tuple(settled(records)), tasks, problems=tuple(problems))
+    return RunContents(name, tuple(settled(records)), by_task(tasks), problems=tuple(problems))
 
 
-def _tasks(data: Mapping[str, Any], where: str, problems: list[str]) -> dict[str, TaskDescription]:
+def _tasks(data: Mapping[str, Any], where: str, problems: list[str]) -> list[TaskDescription]:
     """What the numbers of a benchmark mean; older files do not tell."""
-    found = {}
+    found = []
     listed = data.get("tasks") or []
     for item in listed if isinstance(listed, list) else [listed]:
         try:
-            task = TaskDescription.from_dict(item, f"{where}: {KEY!r}")
+            found.append(TaskDescription.from_dict(item, f"{where}: {KEY!r}"))
         except CheckError as error:
             problems.append(str(error))
-        else:
-            found[task.task] = task
     return found
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from math import isfinite
 from typing import Any, Protocol, Self
@@ -76,6 +76,17 @@ class TaskDescription(FolderLine):
         """What a task says of itself; a reference that is no finite number is none."""
         known = {name: value for name, value in task.references.items() if isfinite(value)}
         return cls(task.name, tuple(task.metrics), known)
+
+
+def by_task(descriptions: Iterable[TaskDescription]) -> dict[str, TaskDescription]:
+    """What tests say of each task together; where they differ, the last one holds."""
+    found: dict[str, TaskDescription] = {}
+    for said in descriptions:
+        known = found.setdefault(said.task, said)
+        metrics = {metric.name: metric for metric in (*known.metrics, *said.metrics)}
+        references = {**known.references, **said.references}
+        found[said.task] = TaskDescription(said.task, tuple(metrics.values()), references)
+    return found
 
 
 @dataclass(frozen=True)

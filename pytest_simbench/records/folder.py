@@ -1,8 +1,8 @@
 """The run folder: what is recorded of a run, and what its numbers mean, written and read back.
 
     records.jsonl      a line for each repetition (`record`)
-    tasks.jsonl        what each task's metrics and references mean (`description`); of several
-                       lines of one task the last one holds
+    tasks.jsonl        what each task's metrics and references mean (`description`); the lines of
+                       one task hold together, and of one metric the last one
     thresholds.jsonl   thresholds that tests asked for
     claims.jsonl       what tests claimed, and what came of it (`claims`)
     repeatability.jsonl, logs, traces, report.md, ...
@@ -23,7 +23,8 @@ from typing import Any
 
 from pytest_simbench.records import lines
 from pytest_simbench.records.claims import Claim
-from pytest_simbench.records.description import Describing, TaskDescription, Threshold
+from pytest_simbench.records.configuration import other_meanings
+from pytest_simbench.records.description import Describing, TaskDescription, Threshold, by_task
 from pytest_simbench.records.lines import DAMAGED, LARGEST_LINE, Found, LinesFile, UnreadableError
 from pytest_simbench.records.lock import FolderLock
 from pytest_simbench.records.metrics import Metric
@@ -140,6 +141,9 @@ class RunFolder:
         """
         if self._folder_lock is None:
             self._folder_lock = FolderLock(self.path, shared=shared)
+            for name in () if shared or self.holds_run else (TASKS, THRESHOLDS, CLAIMS):
+                with suppress(OSError):  # of a run that recorded nothing
+                    (self.path / name).unlink()
 
     def release(self) -> None:
         """Give it up; a folder made for nothing goes away."""
@@ -179,13 +183,23 @@ class RunFolder:
             self.own += records
 
     def describe(self, task: Describing | TaskDescription) -> None:
-        """Write what a task's numbers mean, unless the folder says so already."""
+        """Write what a task's numbers mean, unless the folder says so already.
+
+        Raises:
+            RecordError: another task of that name has numbers that mean something else.
+        """
         found = task if isinstance(task, TaskDescription) else TaskDescription.of(task)
         with self._lock:
-            if self._described.get(found.task) != found:
-                self._described[found.task] = found
-                if self._tasks().get(found.task) != found:
-                    self._write(TASKS, json.dumps(found.to_dict()))
+            known = self._tasks()
+            if said := other_meanings(known, {found.task: found}, "merge"):
+                raise RecordError(
+                    f"{'; '.join(said)}: another task of this run is named {found.task} too; give "
+                    "one of them a `name` of its own"
+                )
+            whole = by_task([*known.values(), found])[found.task]
+            self._described[found.task] = whole
+            if whole != known.get(found.task):
+                self._write(TASKS, json.dumps(whole.to_dict()))
 
     def ask(self, threshold: Threshold) -> None:
         """Write a threshold that a test asked for."""
@@ -230,7 +244,7 @@ class RunFolder:
         problems = list(found.problems)
         # Those in memory come last: they are there although the disk may be full.
         records = settled([*found.items, *self.own])
-        tasks = {**self._tasks(problems), **self._described}
+        tasks = self._tasks(problems)
         asked = dict.fromkeys([*self._parsed(THRESHOLDS, Threshold, problems), *self._asked])
         claims = (*self._parsed(CLAIMS, Claim, problems), *self._claims)
         return RunContents(
@@ -245,8 +259,14 @@ class RunFolder:
         )
 
     def _tasks(self, problems: list[str] | None = None) -> dict[str, TaskDescription]:
-        found = self._parsed(TASKS, TaskDescription, [] if problems is None else problems)
-        return {task.task: task for task in found}
+        """What the numbers of each task mean; `problems` takes what is wrong with their lines."""
+        problems = [] if problems is None else problems
+        found: dict[str, TaskDescription] = {}
+        for task in (*self._parsed(TASKS, TaskDescription, problems), *self._described.values()):
+            said = other_meanings(found, {task.task: task}, "merge")
+            problems += [f"{self.path / TASKS}: {text}; the last one holds" for text in said]
+            found = by_task([*found.values(), task])
+        return found
 
     def _parsed(self, name: str, kind: Any, problems: list[str]) -> tuple[Any, ...]:
         """The items of a file beside the records, which may be missing."""

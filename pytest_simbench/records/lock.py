@@ -29,7 +29,7 @@ class FolderLock:
     def __init__(self, folder: Path, *, shared: bool = False) -> None:
         self.folder = folder
         self._lock: int | None = None
-        self._made = not os.path.lexists(folder)
+        self._made = [path for path in (folder, *folder.parents) if not os.path.lexists(path)]
         try:
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -68,9 +68,9 @@ class FolderLock:
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
-            if self._made:
-                with suppress(OSError):
-                    self.folder.rmdir()
+            with suppress(OSError):
+                for path in self._made:
+                    path.rmdir()
 
 
 def _probe(folder: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from pytest_simbench.records.configuration import differences, other_meanings, task_parameters
-from pytest_simbench.records.description import TaskDescription
+from pytest_simbench.records.description import TaskDescription, by_task
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import by_test, configurations, grouped
 
@@ -74,7 +74,7 @@ def merge_tasks(runs: Mapping[str, Mapping[str, TaskDescription]]) -> dict[str, 
                     f"first is {first[task]})"
                 )
             first.setdefault(task, name)
-        found |= tasks
+        found = by_task([*found.values(), *tasks.values()])
     return found
 
 

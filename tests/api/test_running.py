@@ -142,7 +142,7 @@ def test_a_policy_that_cannot_be_asked_is_one_sentence(scripted: dict[str, Any])
 
 
 def test_a_run_is_gone_on_with(scripted: dict[str, Any]) -> None:
-    first = simbench.run(Falling(), "mujoco", reps=2)
+    first = simbench.run(Falling(), "mujoco", reps=2, folder="")
     shutil.copytree(first.folder, ".simbench/tune-mujoco-falling")  # a search is no run
     more = simbench.run(Falling(), "mujoco", reps=3, resume=True)  # the newest
     assert more.folder == first.folder

@@ -13,9 +13,11 @@ import pytest
 
 from pytest_simbench.cli.main import main
 from pytest_simbench.cluster import pool as module
+from pytest_simbench.cluster.executor import ClusterExecutor
 from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node, here, refusal, unmet
 from pytest_simbench.cluster.pool import Pool
 from pytest_simbench.cluster.serving import not_taken
+from pytest_simbench.experiment.case import Case
 from pytest_simbench.simulator.registry import adapter
 from tests.cluster.machines import release_in
 
@@ -136,6 +138,14 @@ def test_a_node_that_was_given_up_gets_nothing(monkeypatch: pytest.MonkeyPatch) 
     pool = Told([A, lab("c", "drake==1.51")])
     pool.give_up(A)
     assert taken(pool) is None  # nobody else offers it
+
+
+def test_a_node_that_joins_with_another_version_is_left_out_and_told(case: Case) -> None:
+    told: list[str] = []
+    executor = ClusterExecutor(Told([A]), told.append)
+    assert executor.able(case, A)
+    assert not executor.able(case, lab("c", "mujoco==9.9"))
+    assert told == ["c got no repetition of mujoco: it has version 9.9, and the run began with 4.0"]
 
 
 def test_waiting_ends_when_the_run_does() -> None:

@@ -137,6 +137,10 @@ def test_the_run_that_began_last_is_gone_on_with(tmp_path: Path) -> None:
         run.touch()
         os.utime(run, (written, written))
     assert run_to_resume(None, tmp_path).name == "2026-07-01_12-00-00-a"
+    (killed := tmp_path / "2026-07-02_12-00-00-d").mkdir()  # in its first repetition
+    RunFolder(killed).describe(Falling())
+    assert run_to_resume(None, tmp_path) == killed
+    assert Resumed(RunFolder(killed)).tasks == {}
     assert run_to_resume(run.parent, tmp_path) == run.parent
     for folder in (None, run):
         with pytest.raises(NotResumed, match="there is no run to resume in"):

@@ -59,6 +59,8 @@ def test_a_crashed_repetition_counts_with_the_worst_value_that_there_is(
     assert (len(result), len(result.ok), len(result.crashed)) == (5, 2, 2)
     assert result.failures == result.crashed
     assert result.by_seed(CRASHED) == {1000: 0.0, 1001: 0.0, 1002: 1.0, 1003: 1.0}
+    others = Metric("others", "of another test of the task", kind="yes_no")
+    assert ResultSet(made, (others,)).values("others") == []
 
 
 @pytest.mark.parametrize(

@@ -155,3 +155,22 @@ def test_settings_and_resources(pytester: pytest.Pytester) -> None:
         """
     )
     run_pytest(pytester, "--sim=mujoco", passed=1)
+
+
+def test_a_test_case_has_no_simulator(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        """
+        import pytest, unittest
+
+        def test_first(output_path):
+            pass
+
+        class TestIt(unittest.TestCase):
+            taken = pytest.fixture(autouse=True)(lambda self, repeat: None)
+
+            def test_it(self):
+                pass
+        """
+    )
+    result = run_pytest(pytester, "--sim=mujoco", passed=1, errors=1)
+    result.stdout.fnmatch_lines(["a fixture of a simulator was asked for by a TestCase, *"])

@@ -47,10 +47,14 @@ def test_a_folder_with_a_run_is_refused_before_anything_runs(pytester: pytest.Py
     assert {path: path.read_bytes() for path in before} == before
 
 
-@pytest.mark.parametrize("arguments", [[], ["-n1"]], ids=["plain", "xdist"])
+@pytest.mark.parametrize(
+    "arguments",
+    [["--sim-output=o"], ["--sim-output=o", "-n1"], ["-osim_output=o", "-n1"]],
+    ids=["plain", "xdist", "ini"],
+)
 def test_two_processes_on_one_folder(pytester: pytest.Pytester, arguments: list[str]) -> None:
     pytester.makepyfile(TEST.replace("0.2", "30.0"))
-    command = [sys.executable, "-m", "pytest", "--sim=mujoco", "--reps=2", "--sim-output=o"]
+    command = [sys.executable, "-m", "pytest", "--sim=mujoco", "--reps=2"]
     both = [
         subprocess.Popen(
             [*command, *arguments],
@@ -61,9 +65,9 @@ def test_two_processes_on_one_folder(pytester: pytest.Pytester, arguments: list[
         for _ in range(2)
     ]
     told = [process.communicate(timeout=300) for process in both]
-    assert sorted(process.returncode for process in both) == [0, 4], told
+    assert sorted(process.returncode for process in both) in ([0, 4], [0, 1]), told
     assert [r["repetition"] for r in records(pytester.path / "o")] == [1, 2]
-    (refused,) = [err for (_, err), p in zip(told, both, strict=True) if p.returncode == 4]
+    (refused,) = [out + err for (out, err), p in zip(told, both, strict=True) if p.returncode]
     assert b"another run is under way in" in refused or b"already holds a run" in refused
 
 

@@ -77,6 +77,16 @@ def test_one_job_runs_one_after_the_other(
     assert all(one[1] <= other[0] for one, other in pairwise(sorted(spans)))
 
 
+def test_one_with_settings_of_its_own_does_not_begin_before(
+    pytester: pytest.Pytester, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ALONE", "yes")
+    own = "\nsim_settings = pytest.fixture(lambda: {'timestep': 0.01})\n"
+    (folder / "test_it.py").write_text(dedent(TEST) + own)
+    run(pytester, "--sim-jobs=2", passed=4)
+    assert len((folder / "spans").read_text().splitlines()) == 4
+
+
 def test_a_mark_that_names_no_task_is_an_error(pytester: pytest.Pytester, folder: Path) -> None:
     (folder / "test_it.py").write_text(dedent(TEST).replace('repeats("task")', 'repeats("law")'))
     result = run(pytester, "--sim-jobs=2", failed=4)

@@ -148,10 +148,19 @@ def test_what_numbers_mean_is_read_back_and_written_once(tmp_path: Path) -> None
     assert RunFolder.of(tmp_path / RECORDS).read().tasks == found.tasks
 
 
-def test_the_last_line_of_a_task_holds(tmp_path: Path) -> None:
-    other = TaskDescription("pouring", (CAUGHT,))
-    assert folder_with(tmp_path, POURING, other).read().tasks == {"pouring": other}
-    assert folder_with(tmp_path, POURING).read().tasks == {"pouring": POURING}
+def test_tests_of_one_task_tell_its_numbers_together(tmp_path: Path) -> None:
+    said = TaskDescription("pouring", (replace(CAUGHT, doc="new"), Metric("left", "left")))
+    both = replace(POURING, metrics=(said.metrics[0], SPILL, said.metrics[1]))
+    assert folder_with(tmp_path, POURING, said).read().tasks == {"pouring": both}
+    other = TaskDescription("pouring", (replace(SPILL, unit="l"),))
+    with pytest.raises(RecordError, match='spill of pouring was "ml", is "l": another task of'):
+        RunFolder(tmp_path).describe(other)
+    with (tmp_path / TASKS).open("a") as file:  # two processes at once, or an older version
+        file.write(json.dumps(other.to_dict()) + "\n")
+    found = RunFolder(tmp_path).read()
+    assert found.metrics["pouring"][1].unit == "l"
+    assert found.problems == (f"{tmp_path / TASKS}: unit of the metric spill of pouring was "
+                              '"ml", is "l"; the last one holds',)  # fmt: skip
 
 
 def test_thresholds_are_read_back_each_once(tmp_path: Path) -> None:
@@ -260,6 +269,9 @@ def test_a_claimed_folder_is_given_up(tmp_path: Path) -> None:
     assert folder.close() == ()
     assert not folder.locked
     assert not (tmp_path / "run").exists()
+    folder.describe(POURING)
+    RunFolder(tmp_path / "run").lock()  # what a run left that recorded nothing is gone
+    assert not (tmp_path / "run" / TASKS).exists()
 
 
 def test_a_nest_too_deep_is_told_without_its_depth(tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def test_the_processes_of_one_run_share_it(tmp_path: Path) -> None:
 
 
 def test_a_folder_made_for_nothing_goes_away(tmp_path: Path) -> None:
-    FolderLock(tmp_path / "new").close()
+    FolderLock(tmp_path / "new" / "run").close()
     assert not (tmp_path / "new").exists()
     (tmp_path / "old").mkdir()
     FolderLock(tmp_path / "old").close()

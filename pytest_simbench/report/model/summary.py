@@ -255,7 +255,7 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row
         failed=len(results.crashed),
         interrupted=len(results.interrupted),
         metrics={
-            m.name: spread([r.value(m) for r in records], None if results.sole(m.name) else m)
+            m.name: spread(results.values(m.name), None if results.sole(m.name) else m)
             for m in metrics
         },
         costs={
