@@ -190,6 +190,9 @@ class RunFolder:
         """
         found = task if isinstance(task, TaskDescription) else TaskDescription.of(task)
         with self._lock:
+            here = self._described.get(found.task)
+            if here is not None and by_task([here, found])[found.task] == here:
+                return
             known = self._tasks()
             if said := other_meanings(known, {found.task: found}, "merge"):
                 raise RecordError(
@@ -265,7 +268,7 @@ class RunFolder:
         for task in (*self._parsed(TASKS, TaskDescription, problems), *self._described.values()):
             said = other_meanings(found, {task.task: task}, "merge")
             problems += [f"{self.path / TASKS}: {text}; the last one holds" for text in said]
-            found = by_task([*found.values(), task])
+            found |= by_task([*filter(None, [found.get(task.task)]), task])
         return found
 
     def _parsed(self, name: str, kind: Any, problems: list[str]) -> tuple[Any, ...]:
