@@ -28,6 +28,7 @@ class NewtonSettings(Settings):
             contacts, 2 / kd [s], and damping ratio, kd / (2 sqrt(ke)).
         kd: contact damping [N s/m].
         solimp: contact impedance: minimum, maximum, width [m].
+        multiccd: whether round and convex shapes touch in several points, not in one.
         gap: distance within which contacts are looked for [m]; Newton's default is 0.1.
     """
 
@@ -41,6 +42,7 @@ class NewtonSettings(Settings):
     ke: Annotated[float, Log(1e3, 1e6)] = 2500.0
     kd: Annotated[float, Log(30, 3000)] = 100.0
     solimp: Solimp = (0.9, 0.95, 0.001)
+    multiccd: Annotated[bool, EACH] = False
     gap: float = 0.1
 
 

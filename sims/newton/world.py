@@ -64,6 +64,7 @@ def make_solver(model: Any, prepared: PreparedRobot | None, settings: NewtonSett
         integrator=settings.integrator,
         cone=settings.cone,
         impratio=settings.impratio,
+        enable_multiccd=settings.multiccd,
     )
     options = solver.mj_model.opt
     options.timestep = settings.timestep

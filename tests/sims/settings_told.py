@@ -50,11 +50,16 @@ def told_mujoco(s: Any) -> Told:
 
 
 def told_newton(s: Any) -> Told:
-    told = of_mujoco(s.solver.mj_model)
+    import mujoco
+
+    model = s.solver.mj_model
+    told = of_mujoco(model)
     time, ratio = told.pop("solref")
     del told["noslip_iterations"]
     ke = (1 / (time * ratio)) ** 2
-    return told | {"kd": 2 / time, "ke": ke, "gap": one(s.solver.mj_model.geom_gap)}
+    multiccd = not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_MULTICCD
+    more = {"kd": 2 / time, "ke": ke, "gap": one(model.geom_gap), "multiccd": multiccd}
+    return told | more
 
 
 def told_pybullet(s: Any) -> Told:

@@ -31,9 +31,9 @@ PUBLISHED = {
         "file": "aeed4602",
     },
     "newton": {
-        "default": "8b37d745",
-        "tuned": "3930bd77",
-        "real": "ba7c8d66",
+        "default": "bddba8dd",
+        "tuned": "ea91e0b9",
+        "real": "4e0243a1",
         "file": "aeed4602",
     },
     "ode": {"default": "f1f2c655", "tuned": "7c840eea", "real": "85bf7f2e"},

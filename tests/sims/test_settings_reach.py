@@ -65,7 +65,7 @@ MUJOCO = {
 
 TOLD: dict[str, tuple[Changes, ...]] = {
     "mujoco": ({**MUJOCO, "solref": (0.03, 0.8), "noslip_iterations": 7},),
-    "newton": ({**MUJOCO, "ke": 900.0, "kd": 50.0, "gap": 0.07},),
+    "newton": ({**MUJOCO, "ke": 900.0, "kd": 50.0, "multiccd": True, "gap": 0.07},),
     "pybullet": ({"timestep": 0.003, "solver_iterations": 33, "spinning_friction": 0.02},),
     "sapien": (
         {
