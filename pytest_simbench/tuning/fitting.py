@@ -113,10 +113,10 @@ class Fit:
         found: list[State] = []
         for state in self._coarse()[:RESTARTS]:
             found.append(self._least(state))
-            if self.noise is None or not self.misfit(found[-1].columns):
+            if not self.misfit(found[-1].columns):
                 break
         best = min(found, key=lambda state: self._cost(state.columns))
-        if self.noise and self.misfit(best.columns):
+        if self.misfit(best.columns):
             best = self._least(self._pattern(best))
         sizes = np.linalg.norm(best.slopes, axis=0)
         if np.linalg.cond(best.slopes / np.maximum(sizes, 1e-9)) > 10:
