@@ -112,7 +112,8 @@ def _lines(results: Sequence[Told], fitting: Fit, found: State) -> Iterator[str]
         before, after = ("-" if value is None else significant(value) for value in values)
         yield f"{metric.title}: {before} {metric.unit} before, {after} {metric.unit} after"
     for name, times in fitting.misfit(found.columns).items():
-        yield f"{name} is {significant(times)} times the noise off: the scene does not explain it"
+        off = f"{name} is {significant(times)} times the noise off"
+        yield f"{off}: no values were found that explain it"
     yield f"{fitting.looks} repetitions"
 
 

@@ -1,12 +1,14 @@
 """Unknowns of a scene from a log: least squares over their logarithms. Coarse points over the
-ranges come first, so that a wrong start does no harm; then Levenberg and Marquardt's method from
-the best, with differences over two percent of each unknown."""
+ranges come first, so that a wrong start does less harm; then Levenberg and Marquardt's method from
+the best, with differences over two percent of each unknown; and where contacts make these too rough
+to go on by, a pattern search without slopes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -27,6 +29,9 @@ RESTARTS = 3
 STEP = 0.02
 """Of an unknown's logarithm, for differences: contacts make smaller ones rough."""
 
+PATTERN = 1.0
+"""First step of the pattern search, of an unknown's logarithm; it ends below `STEP`."""
+
 UNIT, START_STEP = 0.01, 0.1
 """Of the starts of joints [rad or m]; the same of them, in that unit."""
 
@@ -46,7 +51,7 @@ WORSE = 8.0
 """The log of the likelihood at three times half an interval: 17 where slopes are right."""
 
 MUCH = 1.5
-"""Times the stated noise: the scene does not explain the log."""
+"""Times the stated noise: the values do not explain the log."""
 
 ROUGH = 1.0
 """Second difference over the first; of what is chaotic 3.5, and of what is smooth 0.1."""
@@ -108,9 +113,11 @@ class Fit:
         found: list[State] = []
         for state in self._coarse()[:RESTARTS]:
             found.append(self._least(state))
-            if self.noise is None or not self.misfit(found[-1].columns):
+            if not self.misfit(found[-1].columns):
                 break
         best = min(found, key=lambda state: self._cost(state.columns))
+        if self.misfit(best.columns):
+            best = self._least(self._pattern(best))
         sizes = np.linalg.norm(best.slopes, axis=0)
         if np.linalg.cond(best.slopes / np.maximum(sizes, 1e-9)) > 10:
             best = replace(best, slopes=self._slopes(best, both=True))  # what goes together
@@ -192,6 +199,22 @@ class Fit:
             at, damping = replace(new, slopes=at.slopes), damping / 10
             if gain < ENOUGH:
                 return at
+        return at
+
+    def _pattern(self, at: State) -> State:
+        """Steps of one unknown at a time, half as long where none is better, until what is left is
+        the noise."""
+        step = PATTERN
+        while step > STEP and self.misfit(at.columns):
+            best = at
+            for k, h in product(range(len(self.unknowns)), (step, -step)):
+                point = at.point.copy()
+                point[k] += h
+                new = self._look(point) if self._inside(k, point[k]) else None
+                if new and self._cost(new.columns) < self._cost(best.columns):
+                    best = new
+            step = step / 2 if best is at else step
+            at = best
         return at
 
     def _slopes(self, at: State, both: bool) -> FloatArray:

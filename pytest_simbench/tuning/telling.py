@@ -55,17 +55,20 @@ def told(fit: Fit, at: State) -> Iterator[Told]:
     cov = np.linalg.inv(known + 1e-9 * np.eye(len(known)))
     sd = np.sqrt(np.diag(cov))
     names = [one.name for one in fit.unknowns] + list(fit.starts)
+    misfit = fit.misfit(at.columns)
     for k, one in enumerate(fit.unknowns):
         x, low, high, why = at.point[k], fit.low[k], fit.high[k], ""
         alone, half = factor / math.sqrt(known[k, k] + 1e-9), factor * sd[k]
         at_end = float(np.linalg.norm(at.slopes[:, k])) > factor / WIDE
         at_end = at_end and not low + 1e-6 < x < high - 1e-6
         together = half > max(WIDE, 2 * alone)
-        alone = alone if at_end else fit.widened(at, k, alone)
+        alone = alone if at_end or misfit else fit.widened(at, k, alone)
         half = max(alone, half)
         open_ = [w > WIDE or not (at_end or low < x - w < x + w < high) for w in (alone, half)]
         if at_end and not together:
             why = "the best lies at the end of its range: give a wider one"
+        elif misfit:
+            why = f"no values were found that explain the log; the best is {math.exp(x):.4g}"
         elif open_[0]:
             why = "what was measured hardly depends on it, or jumps about as it changes"
         elif open_[1]:
