@@ -30,7 +30,7 @@ from . import world as build
 from .axes import Axis
 from .contacts import Contacts, Part
 from .drives import Drives
-from .library import body_id, library, library_path, turn, turned
+from .library import GAVE_UP, body_id, library, library_path, messages, turn, turned
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, ODESettings
 
@@ -40,6 +40,9 @@ PACKAGES = ("python3-numpy", "python3-pyode")
 
 SEED = 0
 """Of ODE's own random numbers, by which quickStep shuffles its rows; 0 is where they begin."""
+
+STUCK = 0.2
+"""So long the solver may give up in every step [s]; meshes that touch made it do so for 3."""
 
 
 State = tuple[int, list[Any], list[tuple[bytes, bytes]], list[bool], list[Any], Any, int]
@@ -125,7 +128,7 @@ class ODE(Simulator):
         for pair in scene.apart:
             self.contacts.apart.add(frozenset(id(self._parts[name].surface) for name in pair))
         links = [part.body for part in self._links.values() if part.body is not None]
-        self._moving = [*self._free, *links]
+        self._moving, self._stuck = [*self._free, *links], 0
         if self._drives is not None:
             self._moving += [pinion.body for pinion in self._drives.pinions.values()]
         self._names = [body_id(body) for body in self._moving]
@@ -183,11 +186,18 @@ class ODE(Simulator):
             if axis.wide:
                 axis.tell_stops()
         self.contacts.make()
+        messages.clear()
         self._advance(self.settings.timestep)
         if self._drives is not None:
             self._drives.rest()
         self._bear()
         self._steps += 1
+        self._stuck = self._stuck + 1 if GAVE_UP in messages else 0
+        if self._stuck * self.settings.timestep >= STUCK:
+            raise RuntimeError(
+                f"ODE's solver has given up in every step for {STUCK:g} s, at t = {self.time:.3f} "
+                "s, and drives and contacts had no force; try --sim-set ode.solver=quickstep"
+            )
 
     def body_state(self) -> FloatArray:
         state = np.empty((len(self._free), 13))

@@ -135,7 +135,7 @@ class Contacts:
     def settle(self) -> None:
         """Have the space note what has moved. What moves next then comes first in its order, which
         is the order of the contacts, and so of the rows that the solver sums."""
-        self.space.collide(None, _nothing)
+        self.space.collide(None, lambda *pair: None)
 
     def clear(self) -> None:
         """Take the joints away."""
@@ -203,10 +203,6 @@ def _empty(group: Any, joints: list[tuple[Any, Surface, Surface]]) -> None:
 def _awake(one: Any, other: Any) -> bool:
     """Whether one of two bodies is; None never moves."""
     return any(body is not None and body.isEnabled() for body in (one, other))
-
-
-def _nothing(_: Any, first: Any, second: Any) -> None:
-    """Leave a pair alone."""
 
 
 def _slip(contact: Any, one: Any, other: Any) -> tuple[float, float, float] | None:

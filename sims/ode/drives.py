@@ -116,10 +116,10 @@ class Drives:
         self._shares, softness = _law(robot, timestep, drive, position_gain)
         self._zeros = self._shares[0] * [axis.zero for axis in self.axes]
         fingers = [axes[name] for name in robot.gripper.joints]
-        for axis, soft, limit in zip(
-            self.axes, softness, robot.column("effort_limit"), strict=True
-        ):
-            axis.joint.setParam(MOST_FORCE, limit)
+        self._softness = dict(zip(self.axes, softness, strict=True))
+        self._limits = dict(zip(self.axes, robot.column("effort_limit").tolist(), strict=True))
+        for axis, soft in self._softness.items():
+            axis.joint.setParam(MOST_FORCE, self._limits[axis])
             if soft is not None:
                 axis.joint.setParam(SOFTNESS, soft)
         inertias = dict(zip(robot.joint_names, robot.column("armature"), strict=True))
@@ -140,8 +140,6 @@ class Drives:
             stops = [axis.joint.getParam(end) for end in (LO_STOP, HI_STOP)]
             stops = stops if eased else [-np.inf, np.inf]
             self._motors.append((axis, axis.joint.setParam, axis.angle, float(gain), *stops))
-        self._softness = dict(zip(self.axes, softness, strict=True))
-        self._limits = dict(zip(self.axes, robot.column("effort_limit").tolist(), strict=True))
         self._eased: list[Axis] = []
         start = robot.column("initial_position")
         self.command(start, 0 * start, 0 * start)

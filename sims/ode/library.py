@@ -29,6 +29,21 @@ after it are those of an older ODE, before two new ones came in between: they se
 
 _ID, _REAL = ctypes.c_void_p, ctypes.c_double
 
+GAVE_UP = 3
+"""Number of the message that the solver found no solution (include/ode/error.h, d_ERR_LCP)."""
+
+messages: list[int] = []
+"""Numbers of ODE's messages since the list was emptied."""
+
+
+def _take(number: int, text: bytes, values: int | None) -> None:
+    messages.append(number)
+    print(f"ODE message {number}: {text.decode()}")
+
+
+_HANDLER = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_char_p, _ID)(_take)
+"""Of messages, in place of ODE's own (`dMessageFunction`)."""
+
 _FUNCTIONS: dict[str, tuple[Any, Sequence[Any]]] = {
     "dRandSetSeed": (None, [ctypes.c_ulong]),
     "dRandGetSeed": (ctypes.c_ulong, []),
@@ -81,6 +96,7 @@ def library() -> Any:
     for part in ("ODE_double_precision", "ODE_EXT_trimesh"):
         if not found.dCheckConfiguration(part.encode()):
             raise RuntimeError(f"{library_path()} was built without {part}")
+    found.dSetMessageHandler(_HANDLER)
     return found
 
 

@@ -96,10 +96,6 @@ def weightless(name: str) -> Plant:
     return lambda s: part(s, name).body.setGravityMode(False)
 
 
-def damped(name: str) -> Plant:
-    return lambda s: set_damping(part(s, name).body, np.array([1e-4, 0.0]))
-
-
 def uncoupled(s: Any) -> None:
     for pinion in s._drives.pinions.values():
         pinion.release()
@@ -113,7 +109,7 @@ FAULTS: dict[str, Plant] = {
     "body/cube_05/touches": ghost("cube_05"),
     "body/cube_05/dynamic": lambda s: part(s, "cube_05").body.setKinematic(),
     "link/panda_link4/restitution": surface("panda_link4", "bounce", 0.5),
-    "link/panda_link4/damping": damped("panda_link4"),
+    "link/panda_link4/damping": lambda s: set_damping(part(s, "panda_link4").body, np.r_[1e-4, 0]),
     "link/panda_link4/gravity": weightless("panda_link4"),
     "link/panda_link4/touches": ghost("panda_link4"),
     "gripper/coupled": uncoupled,

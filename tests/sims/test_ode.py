@@ -228,6 +228,16 @@ def test_a_convex_body_may_touch_the_mesh_of_a_link(worlds: Worlds) -> None:
     assert any(name.startswith("link/") for name in touched)
 
 
+def test_a_solver_that_gives_up_in_every_step_ends_the_run(worlds: Worlds) -> None:
+    arm = Part("arm", (0.0, 0.0, 1.0), centre=(0.1, 0.0, 0.0))
+    led = Part("led", Y, (0.3, 0.0, 0.0), (0.1, 0.0, 0.0), slides=True, stiffness=1e3, effort=25.0)
+    other = replace(led, name="other", axis=(0.0, -1.0, 0.0), centre=(0.0, 0.1, 0.0), on="arm")
+    robot = mechanism("hand", arm, led, other, couplings=(Coupling("other", "led"),))
+    world = worlds.load(Scene("hand", robot=robot, gravity=(0.0, 0.0, 0.0)))
+    with pytest.raises(EngineFailed, match=r"given up in every step for 0.2 s, at t = 0.2\d\d s, "):
+        to(world, np.array([0.0, 0.1, 0.1]))
+
+
 def test_no_forces_are_told_of_the_step_in_which_things_fall_asleep(worlds: Worlds) -> None:
     world = worlds.load(Scene("cube", (scenes.cube("cube", Pose.at(0.4, 0.0, scenes.EDGE / 2)),)))
     world.wait(1.0)

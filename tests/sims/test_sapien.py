@@ -50,9 +50,8 @@ def test_default_is_what_the_engine_does_by_itself(tmp_path: Path) -> None:
     cube = builder.build("cube").find_component_by_type(physx.PhysxRigidDynamicComponent)
     simulator._ground, simulator._free = cube, [cube]
     path = PreparedRobot(scenes.arm()).write_urdf(tmp_path, visuals=False)
-    simulator._robot = (
-        bare.create_urdf_loader().load_file_as_articulation_builder(str(path)).build(True)
-    )
+    loader = bare.create_urdf_loader()
+    simulator._robot = loader.load_file_as_articulation_builder(str(path)).build(True)
     expected = {k: v for k, v in vars(simulator.settings).items() if k != "coupling_stiffness"}
     assert told_sapien(simulator) == pytest.approx(expected)
 
@@ -171,10 +170,9 @@ def test_bodies_are_read_in_one_call_as_each_tells_itself() -> None:
     stepped(simulator, 0.08)
 
     def told() -> list[list[float]]:
-        bodies = [simulator._bodies[box.name] for box in scene.free_bodies]
         return [
             [*b.entity.pose.p, *b.entity.pose.q, *b.linear_velocity, *b.angular_velocity]
-            for b in bodies
+            for b in simulator._free
         ]
 
     assert np.abs(simulator.body_state()[:, 7:]).max() > 1e-3
