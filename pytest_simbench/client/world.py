@@ -180,9 +180,7 @@ class World:
         __tracebackhide__ = True
         told, joints = trajectory.position.shape[1], self.joints.shape[1]
         if told != joints:
-            raise SceneError(
-                f"a trajectory of {told} joints in a world of {joints}; give all of `robot.joints`"
-            )
+            raise SceneError(f"a trajectory of {told} joints; give all {joints} of the robot")
         return self._move("follow", log_period, **vars(trajectory))
 
     def wait(

@@ -267,9 +267,8 @@ class Newton(Simulator):
         state = self._states[0]
         if not len(self._q):
             return np.empty((2, 0))
-        return np.stack([state.joint_q.numpy()[self._q], state.joint_qd.numpy()[self._v]]).astype(
-            float
-        )
+        q, v = state.joint_q.numpy()[self._q], state.joint_qd.numpy()[self._v]
+        return np.array([q, v], dtype=float)
 
     def save(self) -> dict[str, Any]:
         """Newton's state and command, and what MuJoCo remembers beyond them (warm starts)."""

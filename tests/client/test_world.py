@@ -79,7 +79,7 @@ def test_an_impact_is_no_divergence_where_the_task_says_so(case: Case) -> None:
 
 
 def test_it_follows_set_points_of_all_its_joints(case: Case) -> None:
-    with opened(case) as world, pytest.raises(SceneError, match="of 1 joints in a world of 0;"):
+    with opened(case) as world, pytest.raises(SceneError, match="1 joints; give all 0 of"):
         world.follow(Trajectory(0.1, [[0.0]], [[0.0]], [[0.0]]))
 
 
