@@ -176,15 +176,18 @@ class World:
 
     def follow(self, trajectory: Trajectory, *, log_period: float | None = None) -> Motion:
         """Have the robot follow a trajectory; the motion sampled every `log_period` [s] (0: each
-        step, None: no samples)."""
+        step, None: no samples). A `SceneError` where it is one of other joints than the robot's."""
         __tracebackhide__ = True
+        told, joints = trajectory.position.shape[1], self.joints.shape[1]
+        if told != joints:
+            raise SceneError(f"a trajectory of {told} joints; give all {joints} of the robot")
         return self._move("follow", log_period, **vars(trajectory))
 
     def wait(
         self, duration: float, *, log_period: float | None = None, striking: bool = False
     ) -> Motion:
-        """Let `duration` [s] of simulated time pass under the last command; the motion as of
-        `follow`. Where bodies are `striking` each other at its end, nobody looks how deep.
+        """Let `duration` [s] of simulated time, one step at least, pass under the last command; the
+        motion as of `follow`. Where bodies are `striking` at its end, nobody looks how deep.
 
         Raises:
             SceneError: the duration is no number, not finite, or negative.

@@ -23,8 +23,8 @@ from pytest_simbench.scene import Body, ConvexMesh, FloatArray, Polytope, Pose, 
 from pytest_simbench.scene.checks import Wire
 from pytest_simbench.scene.pose import vector3
 
-ROOT = "base"
-"""Link of a reduced robot that is fixed in the world; with a `_` where one of the name moves."""
+ROOT, FIXED_ROOT = "base", "fixed base"
+"""Link of a reduced robot that is fixed in the world; and its name where a `base` moves."""
 
 INERTIA = {f"i{'xyz'[row]}{'xyz'[k]}": (row, k) for row in range(3) for k in range(row, 3)}
 """Attributes of a URDF's tensor, ixx, ixy, ..., izz, and where each stands in it."""
@@ -97,7 +97,7 @@ class PreparedRobot:
         raw = {name: self._read_link(e) for name, e in self._description.links.items()}
         joints, root = self._description.joints, self._description.root
         kinds = {_required(joint, "child").attrib["link"]: joint.attrib["type"] for joint in joints}
-        self.root = ROOT if kinds.get(ROOT, "fixed") == "fixed" else f"{ROOT}_"
+        self.root = ROOT if kinds.get(ROOT, "fixed") == "fixed" else FIXED_ROOT
         self.links: dict[str, Link] = {self.root: Link(self.root)}
         self.joints: list[MovingJoint] = []
         self.limits: dict[str, FloatArray] = {}

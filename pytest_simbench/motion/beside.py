@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import combinations
 
 from pytest_simbench.description.links import joined
-from pytest_simbench.description.urdf import ROOT, PreparedRobot
+from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.description.urdf_check import Description
 from pytest_simbench.motion.adapting import mounted
 from pytest_simbench.scene import Robot, Scene
@@ -38,7 +38,8 @@ def with_thing(scene: Scene, thing: Robot) -> Scene:
     arm = scene.robot
     if arm is None:
         raise DescriptionError(f"scene {scene.name!r} has no robot to put {thing.name!r} beside")
-    if PreparedRobot(thing).links[ROOT].shapes:
+    prepared = PreparedRobot(thing)
+    if prepared.links[prepared.root].shapes:
         raise DescriptionError(
             f"{thing.urdf}: the arm would pass through what is fixed of {thing.name!r}; leave its "
             "shapes out, and give them to the scene as fixed bodies"

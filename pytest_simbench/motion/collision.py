@@ -225,10 +225,8 @@ class PlanningScene:
             q = np.concatenate([arm, fingers])
             if pin.computeCollisions(model.pin, model.data, geometry, data, q, True):
                 for index, (first, second) in enumerate(self._pairs):
-                    if (
-                        data.activeCollisionPairs[index]
-                        and data.collisionResults[index].isCollision()
-                    ):
+                    touching = data.collisionResults[index].isCollision()
+                    if touching and data.activeCollisionPairs[index]:
                         objects = geometry.geometryObjects
                         return objects[first].name, objects[second].name
                 return "robot", "obstacle"

@@ -215,11 +215,9 @@ def _adjusted(
         return -np.inf if found is None else found
 
     def possible(time: float) -> bool:
-        start, end = ends(time)
-        inside = (start > model.lower).all() and (start < model.upper).all()
-        inside &= (end > model.lower).all() and (end < model.upper).all()
-        path = np.linspace(start, end, 60)
-        return bool(inside) and planning.first_collision(path, ignored=(held.name,)) is None
+        path = np.linspace(*ends(time), 60)
+        inside = bool(((path > model.lower) & (path < model.upper)).all())
+        return inside and planning.first_collision(path, ignored=(held.name,)) is None
 
     low, high = 0.2 * first, 3.0 * first
     while high > low and not possible(high):

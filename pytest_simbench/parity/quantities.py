@@ -44,7 +44,7 @@ base is the link `base`, whose frame is the world's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from fnmatch import fnmatchcase
 from typing import Any
 
@@ -52,7 +52,7 @@ import numpy as np
 
 from pytest_simbench.description.links import link_poses, links_collide, motion_subspace, reduced
 from pytest_simbench.description.shapes import DIRECTIONS, outlines, reach, shape_points
-from pytest_simbench.description.urdf import ROOT, PreparedRobot
+from pytest_simbench.description.urdf import FIXED_ROOT, ROOT, PreparedRobot
 from pytest_simbench.scene import Body, Box, ConvexMesh, FloatArray, Robot, Scene
 from pytest_simbench.simulator.settings import Settings
 
@@ -103,12 +103,14 @@ def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
     return quantities
 
 
-def constants(names: Iterable[str], scene: Scene) -> list[str]:
+def constants(names: Collection[str], scene: Scene) -> list[str]:
     """Those of the quantities that stay as they are while the world is stepped.
 
     Places and speeds change, but for the places of fixed bodies and of the robot's base.
     """
-    still = {f"body/{body.name}/pose" for body in scene.fixed_bodies} | {f"link/{ROOT}/pose"}
+    base = f"link/{FIXED_ROOT}/pose"
+    base = base if base in names else f"link/{ROOT}/pose"
+    still = {base, *(f"body/{body.name}/pose" for body in scene.fixed_bodies)}
     return [n for n in names if n.rpartition("/")[2] not in MOVING or n in still]
 
 

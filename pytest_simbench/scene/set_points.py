@@ -40,8 +40,10 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         check_number(self.tick, "the tick [s] of a trajectory", 0.0, above=True)
+        for name in ("position", "velocity", "effort"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=float))
         arrays = (self.position, self.velocity, self.effort)
-        shapes = [np.shape(rows) for rows in arrays]
+        shapes = [rows.shape for rows in arrays]
         if len(set(shapes)) > 1 or len(shapes[0]) != 2 or not shapes[0][0]:
             told = ", ".join(map(str, shapes))
             raise SceneError(f"a trajectory of the shapes {told}; give 3 times (rows, joints)")

@@ -213,9 +213,13 @@ def _add_drive(spec: Any, joint: Joint) -> None:
 
 
 def gain(stiffness: Any) -> Any:
-    """Of a drive's actuator, here and in Newton: effort for 1 of its control. At least 1: where a
-    control is above 1e10 (`mjMAXVAL`), MuJoCo takes 0 for all."""
+    """Of a drive's actuator, here and in Newton: effort for 1 of its control. At least 1, so that
+    `MOST` is out of the way."""
     return np.maximum(stiffness, 1.0)
+
+
+MOST = 1e10
+"""Largest control (`mjMAXVAL`): where one is above, MuJoCo takes 0 for all."""
 
 
 def _named(elements: Any, name: str) -> Any:

@@ -33,7 +33,7 @@ from ..mujoco.own_file import FileReadBack, loaded
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from ..mujoco.settings import FileSettings
-from ..mujoco.world import gain, leave_out, shape_label
+from ..mujoco.world import MOST, gain, leave_out, shape_label
 from .own_file import NewtonFile
 from .settings import CHOSEN_ON, PROFILES, NewtonSettings
 from .world import build_model, make_solver, names
@@ -230,7 +230,7 @@ class Newton(Simulator):
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
         asked = self._share * position + (self._damping * velocity + effort) / self._gain
-        self._ctrl[:] = np.clip(asked, -mujoco.mjMAXVAL, mujoco.mjMAXVAL)
+        self._ctrl[:] = asked.clip(-MOST, MOST)
 
     def push(self, wrenches: FloatArray) -> None:
         for state in self._states:  # which take turns
@@ -267,9 +267,8 @@ class Newton(Simulator):
         state = self._states[0]
         if not len(self._q):
             return np.empty((2, 0))
-        return np.stack([state.joint_q.numpy()[self._q], state.joint_qd.numpy()[self._v]]).astype(
-            float
-        )
+        q, v = state.joint_q.numpy()[self._q], state.joint_qd.numpy()[self._v]
+        return np.array([q, v], dtype=float)
 
     def save(self) -> dict[str, Any]:
         """Newton's state and command, and what MuJoCo remembers beyond them (warm starts)."""

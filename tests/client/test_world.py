@@ -22,7 +22,7 @@ from pytest_simbench.client.tape import ARRAYS, Latency, Operation
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
-from pytest_simbench.scene import Pose, Scene, Sphere
+from pytest_simbench.scene import Pose, Scene, SceneError, Sphere, Trajectory
 from pytest_simbench.tasks.base import cube
 from pytest_simbench.worker.wire import pack
 
@@ -76,6 +76,11 @@ def test_an_impact_is_no_divergence_where_the_task_says_so(case: Case) -> None:
             if striking:
                 world.wait(1.0)
                 assert world.bodies[0, 2] == pytest.approx(0.008, abs=1e-3)
+
+
+def test_it_follows_set_points_of_all_its_joints(case: Case) -> None:
+    with opened(case) as world, pytest.raises(SceneError, match="1 joints; give all 0 of"):
+        world.follow(Trajectory(0.1, [[0.0]], [[0.0]], [[0.0]]))
 
 
 def test_a_long_wait_is_kept_out_of_the_simulators_memory(case: Case) -> None:

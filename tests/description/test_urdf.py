@@ -34,7 +34,7 @@ def test_a_link_that_moves_may_be_named_base(tmp_path: Path) -> None:
     file = tmp_path / "arm.urdf"
     file.write_text(Path(panda().urdf).read_text().replace('"panda_link1"', '"base"'))
     prepared = PreparedRobot(replace(panda(), urdf=str(file)))
-    assert list(prepared.links)[:3] == ["base_", "base", "panda_link2"]
+    assert list(prepared.links)[:3] == ["fixed base", "base", "panda_link2"]
 
 
 @pytest.mark.parametrize("base", [Pose(), Pose.at(0.3, -0.2, 0.5, yaw=0.7)])

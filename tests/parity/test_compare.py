@@ -10,6 +10,7 @@ import pytest
 from pytest_simbench.description.shapes import DIRECTIONS
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.parity.compare import Lasting, check, compare, misfit
+from pytest_simbench.parity.quantities import constants
 from pytest_simbench.parity.readback import one_value
 from pytest_simbench.scene import Box, Cylinder, Gripper, Pose, Scene
 from pytest_simbench.simulator import FOLLOWER, Deviation, ParityError
@@ -204,6 +205,8 @@ def test_what_lasts_is_held_against_the_first_reading() -> None:
     lasting = Lasting(LASTS, Scene("s", (SHELF,)), "sim", (near, replace(near, within=None)))
     fine = {"body/can/boxes": 1.0019 * REACH, "body/can/mass": 1.00009}
     lasting.check({**LASTS, **dict.fromkeys([*LASTS][-4:], 5.0), **fine}, 0.1)
+    base = "link/fixed base/pose"  # where another one is named base
+    assert constants(("link/base/pose", base), Scene("s")) == [base]
     for wrong, said in (
         ({"body/can/boxes": 1.0021 * REACH}, "t = 0.123 s, which differ by up to 0.0021$"),
         ({"body/can/boxes": np.ones((2, 10))}, "1x10 numbers .*, 2x10 numbers at t = 0.123 s$"),

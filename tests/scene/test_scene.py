@@ -176,7 +176,7 @@ def test_it_ends_within_half_a_step_of_its_end(rows: int, timestep: float) -> No
 def test_a_bent_motion_is_sampled_straight_between_its_rows(
     timestep: float, expected: list[float]
 ) -> None:
-    rows = np.array([[0.0], [1.0], [4.0], [9.0]])
+    rows = [[0.0], [1.0], [4.0], [9.0]]
     found = Trajectory(0.004, rows, rows, rows).resampled(timestep)
     assert found.position.ravel().tolist() == pytest.approx(expected)
 
