@@ -121,7 +121,8 @@ class RunFolder:
     @property
     def holds_run(self) -> bool:
         """Whether something was recorded in it."""
-        return any(_size(self.path / name) for name in HOLD_RESULTS)
+        paths = [self.path / name for name in HOLD_RESULTS]
+        return any(os.path.exists(path) and os.path.getsize(path) for path in paths)
 
     @property
     def locked(self) -> bool:
@@ -190,7 +191,7 @@ class RunFolder:
         """
         found = task if isinstance(task, TaskDescription) else TaskDescription.of(task)
         with self._lock:
-            known = self._tasks()
+            known = self._tasks([])
             if said := other_meanings(known, {found.task: found}, "merge"):
                 raise RecordError(
                     f"{'; '.join(said)}: another task of this run is named {found.task} too; give "
@@ -258,9 +259,8 @@ class RunFolder:
             every=found.items,
         )
 
-    def _tasks(self, problems: list[str] | None = None) -> dict[str, TaskDescription]:
+    def _tasks(self, problems: list[str]) -> dict[str, TaskDescription]:
         """What the numbers of each task mean; `problems` takes what is wrong with their lines."""
-        problems = [] if problems is None else problems
         found: dict[str, TaskDescription] = {}
         for task in (*self._parsed(TASKS, TaskDescription, problems), *self._described.values()):
             said = other_meanings(found, {task.task: task}, "merge")
@@ -311,10 +311,3 @@ class RunFolder:
                 f"cannot read records from {path} ({error.reason}); give a run folder or its "
                 f"{RECORDS}"
             ) from None
-
-
-def _size(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except OSError:
-        return 0
