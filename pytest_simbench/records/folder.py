@@ -28,7 +28,7 @@ from pytest_simbench.records.description import Describing, TaskDescription, Thr
 from pytest_simbench.records.lines import DAMAGED, LARGEST_LINE, Found, LinesFile, UnreadableError
 from pytest_simbench.records.lock import FolderLock
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.paths import inside
+from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.series import settled
 
@@ -143,8 +143,8 @@ class RunFolder:
         if self._folder_lock is None:
             self._folder_lock = FolderLock(self.path, shared=shared)
             for name in () if shared or self.holds_run else (TASKS, THRESHOLDS, CLAIMS):
-                with suppress(OSError):  # of a run that recorded nothing
-                    (self.path / name).unlink()
+                with suppress(OSError, FolderError):  # of a run that recorded nothing
+                    self.inside(name).unlink()
 
     def release(self) -> None:
         """Give it up; a folder made for nothing goes away."""
