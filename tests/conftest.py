@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from pytest_simbench.client.environments import interpreter, missing
 from pytest_simbench.data import DataMissing, read
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
@@ -212,6 +214,12 @@ def inner_runs(
         monkeypatch.delenv(name, raising=False)
     # matplotlib would look through all fonts in each test's new home: 5 to 10 s every time.
     monkeypatch.setenv("MPLCONFIGDIR", str(tmp_path_factory.getbasetemp() / "matplotlib"))
+
+
+@pytest.fixture
+def handle(case: Case) -> Iterator[SimulatorHandle]:
+    with contextlib.closing(SimulatorHandle(case)) as handle:
+        yield handle
 
 
 @pytest.fixture

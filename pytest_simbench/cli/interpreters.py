@@ -38,17 +38,14 @@ def interpreter_path(text: str, where: str, here: Path) -> str:
     # execnet separates what it is told by //.
     path = "/" + os.path.normpath(Path(here, path)).lstrip("/")
     if os.path.isdir(path):
-        hint = Path(path, "bin", "python")
-        _refuse(where, f"is a folder; give the interpreter in it{_if(hint)}")
+        python = Path(path, "bin", "python")
+        hint = f", {python}" if python.exists() else ""
+        _refuse(where, f"is a folder; give the interpreter in it{hint}")
     if not os.path.exists(path):
         _refuse(where, "there is no such file; give the path of a Python interpreter")
     if not os.access(path, os.X_OK):
         _refuse(where, "the file cannot be executed; give the path of a Python interpreter")
     return path
-
-
-def _if(path: Path) -> str:
-    return f", {path}" if path.exists() else ""
 
 
 def checked_specification(text: str, where: str) -> str:

@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from pytest_simbench.client.errors import Interrupted, NodeLost, Unavailable, Wh
 from pytest_simbench.cluster.job import Job, Packed, TaskFailed, error_from_wire
 from pytest_simbench.cluster.offers import Node
 from pytest_simbench.cluster.pool import Pool
-from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import (
@@ -76,15 +74,11 @@ class Shared:
 
 
 class ClusterExecutor(Executor):
-    """Repetitions on the nodes of a cluster.
-
-    Args:
-        tell: takes a sentence of a node that got no work, each time that one is looked for.
-    """
+    """Repetitions on the nodes of a cluster; `tell` takes why one of these got none."""
 
     def __init__(self, pool: Pool, tell: Callable[[str], None] = lambda told: None) -> None:
         self.pool = pool
-        self._tell = tell
+        self.tell = tell
         self._packing = threading.Lock()
         self._last: tuple[Experiment, Shared] | None = None
 
@@ -97,18 +91,6 @@ class ClusterExecutor(Executor):
         self, experiment: Experiment, number: int, hooks: Hooks | None = None
     ) -> AnyRepetition:
         return RemoteRepetition(self, experiment, number, hooks or Hooks())
-
-    def able(self, case: Case, node: Node) -> bool:
-        """Whether a node can carry out repetitions of a case, with the version that the run has."""
-        if not node.has(case.simulator, case.mode):
-            return False
-        version = node.versions[case.simulator]
-        if (began := self.pool.began.setdefault(case.simulator, version)) != version:
-            self._tell(
-                f"{node.name} got no repetition of {case.simulator}: it has version {version}, "
-                f"and the run began with {began}"
-            )
-        return version == began
 
     def shared(self, experiment: Experiment) -> Shared:
         """What an experiment's repetitions share, made once: meshes and data sets are large.
@@ -140,7 +122,7 @@ class RemoteRepetition:
         self.experiment = experiment
         self._shared = executor.shared
         self.case = case = experiment.case
-        self._able = partial(executor.able, case)
+        self._tell = executor.tell
         self.number = number
         self.hooks = hooks
         self.where = Where(case.simulator, case.mode, number, experiment.seed(number))
@@ -197,6 +179,16 @@ class RemoteRepetition:
             if lacks and any(self._able(n) and n.name not in avoid for n in self.pool.nodes()):
                 continue  # another node may have the device
             return answer
+
+    def _able(self, node: Node) -> bool:
+        """Whether a node can carry it out, with the version that the run has."""
+        name = self.case.simulator
+        if not node.has(name, self.case.mode):
+            return False
+        version = node.versions[name]
+        if (began := self.pool.began.setdefault(name, version)) != version:
+            self._tell(f"{node.name} got no repetition: {name} is {version} there, {began} here")
+        return version == began
 
     def _why(self, end: str) -> str:
         lost = f"it was lost on {', then on '.join(self._lost)}; " if self._lost else ""

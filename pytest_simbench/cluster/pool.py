@@ -60,9 +60,6 @@ class Pool:
     Args:
         address: of the scheduler: `tcp://head:8786`, `tls://head:8786`.
 
-    Attributes:
-        began: versions of the simulators with which the run began, by name.
-
     Raises:
         ExecutorError: no scheduler answers there, or Dask is not installed.
     """
@@ -100,7 +97,7 @@ class Pool:
         self.name = uuid4().hex
         self.call: Callable[[Packed, int], dict[str, Any]] = node_side.run
         self._ready = threading.Condition()
-        self.began: dict[str, str] = {}
+        self.began: dict[str, str] = {}  # the versions of the run's simulators
         self._known: Mapping[str, Node] = {}
         self._others: Mapping[str, int] = {}
         self._mine: dict[str, str] = {}

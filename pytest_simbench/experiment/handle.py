@@ -71,7 +71,8 @@ class SimulatorHandle:
         except BaseException as error:
             if isinstance(error, WorkerError) or (self._process and self._process.busy):
                 self.close()  # dead, or with an answer under way that nobody waits for
-            if isinstance(error, Exception) and not _of_hypothesis(error):
+            given_up = type(error).__module__.startswith("hypothesis.")  # as `assume` does
+            if isinstance(error, Exception) and not given_up:
                 self._keep_example(error, scene)
             raise
         finally:
@@ -109,8 +110,3 @@ class SimulatorHandle:
                 process.kill()
             with suppress(WorkerError):
                 process.close(timeout=5.0)
-
-
-def _of_hypothesis(error: Exception) -> bool:
-    """Whether Hypothesis only gives an example up, as `assume` does."""
-    return type(error).__module__.partition(".")[0] == "hypothesis"

@@ -15,7 +15,7 @@ from pytest_simbench.records.configuration import (
     other_meanings,
     task_parameters,
 )
-from pytest_simbench.records.description import TaskDescription
+from pytest_simbench.records.description import TaskDescription, by_task
 from pytest_simbench.records.folder import RECORDS, TASKS, RunContents, RunFolder
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import configurations, grouped, short
@@ -33,12 +33,8 @@ def run_to_resume(folder: Path | None, runs: Path) -> Path:
     if not found:
         where = f"{folder} (it has no {RECORDS})" if folder else runs
         raise NotResumed(f"there is no run to resume in {where}; name the folder of a run")
-    return max(found, key=_begun).parent
-
-
-def _begun(file: Path) -> tuple[str, float]:
-    """When a run began, by its folder's name; of one second, the one written to last."""
-    return file.parent.name[: len("2026-07-01_12-00-00")], file.stat().st_mtime
+    second = slice(len("2026-07-01_12-00-00"))  # of one second, the one written to last
+    return max(found, key=lambda file: (file.parent.name[second], file.stat().st_mtime)).parent
 
 
 class NotResumed(Exception):
@@ -102,9 +98,8 @@ class Resumed:
             same = [record for record in of_test if id(record) not in self._taken]
         self._taken |= {id(record) for record in same}
         found = [] if all(agree(r, now, "resume") for r in same) else self._differences(same, now)
-        task = experiment.task
-        if same and task.name in self.tasks:
-            ours = {task.name: TaskDescription.of(task)}
+        if same:
+            ours = by_task([TaskDescription.of(experiment.task)])
             found += other_meanings(self.tasks, ours, "resume")
         found += _seeds(same, case.seed)
         if wanted is not None and any(record.repetition > wanted for record in same):

@@ -123,21 +123,22 @@ def expected(session: pytest.Session) -> list[Experiment]:
 def _of(item: pytest.Item) -> Iterator[Experiment]:
     """The experiment of a test of one repetition, if it tells and runs without a window."""
     from pytest_simbench.experiment.experiment import Experiment
-    from pytest_simbench.plugin.marks import number, variant_of
+    from pytest_simbench.experiment.variants import Variant
+    from pytest_simbench.plugin.marks import number
     from pytest_simbench.simulator import SimulatorError
     from pytest_simbench.tasks.base import Task
 
     mark, chosen = item.get_closest_marker(MARK), getattr(item, "callspec", None)
     if mark is None or chosen is None or item.get_closest_marker("skip") is not None:
         return
-    variant, task = variant_of(item), chosen.params.get(*mark.args[:1] or [""])
+    variant, task = chosen.params.get("sim_case"), chosen.params.get(*mark.args[:1] or [""])
     if not isinstance(task, Task):
         pytest.fail(
             f"{item.nodeid}: {MARK} needs the name of a parameter that holds a task; "
             f"choose from {', '.join(name for name in chosen.params if name != 'sim_case')}",
             pytrace=False,
         )
-    if variant is None or variant.mode == "gui" or variant.robot:
+    if not isinstance(variant, Variant) or variant.mode == "gui" or variant.robot:
         return
     settings = item._fixtureinfo.name2fixturedefs.get("sim_settings")  # type: ignore[attr-defined]
     if settings and settings[-1].func.__module__ != "pytest_simbench.plugin.fixtures":

@@ -94,8 +94,9 @@ def skip_what_parameters_need(items: Iterable[pytest.Item]) -> None:
     """Apply `needs` marks of a test's other parameters, as of one law of many: `parameters` cannot
     see them yet."""
     for item in items:
-        variant = variant_of(item)
-        if variant is None or variant in NOTHING.values:
+        chosen = getattr(item, "callspec", None)
+        variant = chosen.params.get("sim_case") if chosen is not None else None
+        if not isinstance(variant, Variant) or variant in NOTHING.values:
             continue
         if any(item.iter_markers("needs")) and not registry.problem(variant.simulator):
             for mark in _needs(item, variant.simulator):
@@ -111,13 +112,6 @@ def _names(mark: pytest.Mark, node: Any) -> list[str]:
     return list(mark.args)
 
 
-def variant_of(item: pytest.Item) -> Variant | None:
-    """What a test is made for; None for what pytest makes no tests of: a TestCase, a doctest."""
-    chosen = getattr(item, "callspec", None)
-    found = chosen.params.get("sim_case") if chosen is not None else None
-    return found if isinstance(found, Variant) else None
-
-
 def named(item: pytest.Item, own: str) -> tuple[str, str]:
     """The id of a test without its parameters; and what the id has of other parameters than ours.
 
@@ -131,12 +125,9 @@ def named(item: pytest.Item, own: str) -> tuple[str, str]:
     return item.nodeid.removesuffix(f"[{chosen.id}]"), "-".join(others)
 
 
-def describe_failure(
-    item: pytest.Item, report: pytest.TestReport, profiles: int
-) -> dict[str, Any] | None:
+def describe_failure(item: pytest.Item, report: pytest.TestReport, profiles: int) -> dict[str, Any]:
     """Plain data of a claim: that a test of a simulator failed as a whole, and why."""
-    if (variant := variant_of(item)) is None:
-        return None
+    variant = item.callspec.params["sim_case"]  # type: ignore[attr-defined]
     function, others = named(item, variant.id_with(profiles))
     crash = getattr(report.longrepr, "reprcrash", None)
     message = crash.message if crash else str(report.longrepr)

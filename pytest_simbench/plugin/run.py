@@ -129,17 +129,13 @@ class Run:
                 f"{self.folder.path}, or give another --sim-output"
             )
 
-    def reserve(self) -> None:
-        """Lock the folder, or keep in `problem` why it cannot be used."""
+    def use(self) -> Path:
+        """The folder, for a test that writes to it; the test fails where it cannot be used."""
         if not self.problem:
             try:
                 self.lock()
             except pytest.UsageError as error:
                 self.problem = str(error)
-
-    def use(self) -> Path:
-        """The folder, for a test that writes to it; the test fails where it cannot be used."""
-        self.reserve()
         if self.problem:
             pytest.fail(self.problem, pytrace=False)
         return self.folder.path

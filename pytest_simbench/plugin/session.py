@@ -6,6 +6,7 @@ Imported at plugin load: standard library and pytest only; everything else is im
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator
+from contextlib import suppress
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
 NAMING = ("sim_name", "sim_robot", "sim_profile", "sim_set", "sim_python", "sim_spec")
 """Options whose values name simulators or robots: they are held against what is registered, which
 takes imports."""
-
-NAMED = ("sim_output", "sim_resume", "sim_history")
-"""Options that name the run folder; without them it is a new one, which no other run has."""
 
 
 class SimSession:
@@ -194,8 +192,9 @@ class SimSession:
         run = self.run
         if run.slots is not None:
             node.workerinput["simbench_slots"] = run.slots.address
-        if options.mentioned(self.config, NAMED):  # two runs may begin there at once
-            run.reserve()
+        if options.mentioned(self.config, ["sim_output", "sim_history"]):  # no new folder
+            with suppress(pytest.fail.Exception):  # for the tests that need it
+                run.use()
         node.workerinput["simbench_folder"] = str(run.folder.path.absolute())
         node.workerinput["simbench_problem"] = run.problem
 
@@ -209,7 +208,7 @@ class SimSession:
         if report.when == "call" and (lines := self.run.of_test(item.nodeid)):
             report.simbench = lines
         report.simbench_told = dict(self.run.told)
-        if report.failed and "sim_case" in fixtures_of(item):
+        if report.failed and hasattr(item, "callspec") and "sim_case" in fixtures_of(item):
             from pytest_simbench.plugin.marks import describe_failure
 
             report.simbench_failed = describe_failure(item, report, len(self.selection.profiles))

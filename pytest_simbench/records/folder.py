@@ -28,7 +28,7 @@ from pytest_simbench.records.description import Describing, TaskDescription, Thr
 from pytest_simbench.records.lines import DAMAGED, LARGEST_LINE, Found, LinesFile, UnreadableError
 from pytest_simbench.records.lock import FolderLock
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.paths import inside
+from pytest_simbench.records.paths import FolderError, inside
 from pytest_simbench.records.record import Record, RecordError
 from pytest_simbench.records.series import settled
 
@@ -121,7 +121,8 @@ class RunFolder:
     @property
     def holds_run(self) -> bool:
         """Whether something was recorded in it."""
-        return any(_size(self.path / name) for name in HOLD_RESULTS)
+        paths = [self.path / name for name in HOLD_RESULTS]
+        return any(os.path.exists(path) and os.path.getsize(path) for path in paths)
 
     @property
     def locked(self) -> bool:
@@ -142,8 +143,8 @@ class RunFolder:
         if self._folder_lock is None:
             self._folder_lock = FolderLock(self.path, shared=shared)
             for name in () if shared or self.holds_run else (TASKS, THRESHOLDS, CLAIMS):
-                with suppress(OSError):  # of a run that recorded nothing
-                    (self.path / name).unlink()
+                with suppress(OSError, FolderError):  # of a run that recorded nothing
+                    self.inside(name).unlink()
 
     def release(self) -> None:
         """Give it up; a folder made for nothing goes away."""
@@ -193,7 +194,7 @@ class RunFolder:
             here = self._described.get(found.task)
             if here is not None and by_task([here, found])[found.task] == here:
                 return
-            known = self._tasks()
+            known = self._tasks([])
             if said := other_meanings(known, {found.task: found}, "merge"):
                 raise RecordError(
                     f"{'; '.join(said)}: another task of this run is named {found.task} too; give "
@@ -261,9 +262,8 @@ class RunFolder:
             every=found.items,
         )
 
-    def _tasks(self, problems: list[str] | None = None) -> dict[str, TaskDescription]:
+    def _tasks(self, problems: list[str]) -> dict[str, TaskDescription]:
         """What the numbers of each task mean; `problems` takes what is wrong with their lines."""
-        problems = [] if problems is None else problems
         found: dict[str, TaskDescription] = {}
         for task in (*self._parsed(TASKS, TaskDescription, problems), *self._described.values()):
             said = other_meanings(found, {task.task: task}, "merge")
@@ -314,10 +314,3 @@ class RunFolder:
                 f"cannot read records from {path} ({error.reason}); give a run folder or its "
                 f"{RECORDS}"
             ) from None
-
-
-def _size(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except OSError:
-        return 0

@@ -63,19 +63,12 @@ def merge_tasks(runs: Mapping[str, Mapping[str, TaskDescription]]) -> dict[str, 
     Raises:
         MergeError: a metric means one thing in one run and another in another.
     """
-    found: dict[str, TaskDescription] = {}
-    first: dict[str, str] = {}
-    for name, tasks in runs.items():
-        for task in tasks:
-            said = other_meanings({task: found.get(task, tasks[task])}, tasks, "merge")
-            if said:
-                raise MergeError(
-                    f"{first[task]} and {name} are not parts of one run: {'; '.join(said)} (the "
-                    f"first is {first[task]})"
-                )
-            first.setdefault(task, name)
-        found = by_task([*found.values(), *tasks.values()])
-    return found
+    for (a, first), (b, second) in combinations(runs.items(), 2):
+        if said := other_meanings(first, second, "merge"):
+            raise MergeError(
+                f"{a} and {b} are not parts of one run: {'; '.join(said)} (the first is {a})"
+            )
+    return by_task(task for tasks in runs.values() for task in tasks.values())
 
 
 def _check(test: str, parts: Mapping[str, Sequence[Record]]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 from fnmatch import fnmatchcase
@@ -13,10 +12,10 @@ import pytest
 import pytest_simbench
 from pytest_simbench.cli import environments, simulators
 from pytest_simbench.cli.main import COMMANDS, GROUPS
-from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.simulator.registry import adapter, registered
 from tests.approval import assert_approved
 from tests.cli.command import said
+from tests.cluster.machines import release_in
 from tests.motion.small_arm import URDF, small_arm
 
 NAMES = [command.name for command in COMMANDS]
@@ -190,15 +189,10 @@ def test_robots_and_their_files(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert "    not used of the URDF: damping and friction of turn, lift (<dynamics>)\n" in out
 
 
-def test_environments_come_and_go(capsys: pytest.CaptureFixture[str]) -> None:
-    name = f"mujoco=={adapter('mujoco').info.tested_version}"
-    environment = Environment.of(adapter(name).info)
-    (environment.folder / "bin").mkdir(parents=True)
-    environment.python.touch()
-    told = {"requirements": list(environment.info.requirements)}
-    (environment.folder / MARKER).write_text(json.dumps(told))
+def test_environments_come_and_go(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name = release_in(tmp_path / "environments")
     assert said(capsys, "environments") == (
-        0, f"{name}: 0 MB, MuJoCo None\n0 MB in {environment.folder.parent}\n", ""
+        0, f"{name}: 0 MB, MuJoCo None\n0 MB in {tmp_path / 'environments'}\n", ""
     )  # fmt: skip
     assert said(capsys, "uninstall", name) == (0, f"{name}: removed, 0 MB\n", "")
     assert "; none is there" in said(capsys, "uninstall", name)[2]

@@ -164,13 +164,6 @@ LOW = SCENE.with_pose("a", Pose.at(0.0, 0.0, 0.2))
 TICK = 0.004
 
 
-@pytest.fixture
-def handle(case: Case) -> Iterator[SimulatorHandle]:
-    handle = SimulatorHandle(case)
-    yield handle
-    handle.close()
-
-
 def ramp(start: float, end: float, rows: int) -> Operation:
     """One joint from start to end."""
     position = np.linspace(start, end, rows)[:, None]

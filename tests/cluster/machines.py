@@ -21,6 +21,7 @@ import psutil
 
 from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.simulator.registry import adapter
+from tests.plugin.inner import wrapper
 
 START_TIMEOUT = 90.0
 """For a head or a node to be there, on a busy machine [s]."""
@@ -43,9 +44,7 @@ def release_in(folder: Path) -> str:
     folder of environments: its interpreter is but another name for this one."""
     name = f"mujoco=={adapter('mujoco').info.tested_version}"
     environment = Environment(adapter(name).info, folder / name)
-    environment.python.parent.mkdir(parents=True)
-    environment.python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')
-    environment.python.chmod(0o755)
+    wrapper(environment.python)
     told = {"requirements": list(environment.info.requirements)}
     (environment.folder / MARKER).write_text(json.dumps(told))
     return name

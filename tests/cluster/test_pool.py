@@ -18,8 +18,10 @@ from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node, here, refusal, 
 from pytest_simbench.cluster.pool import Pool
 from pytest_simbench.cluster.serving import not_taken
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.simulator.registry import adapter
 from tests.cluster.machines import release_in
+from tests.tiny import Falling
 
 
 def node(name: str, *offers: str, slots: int = 1) -> Node:
@@ -143,9 +145,9 @@ def test_a_node_that_was_given_up_gets_nothing(monkeypatch: pytest.MonkeyPatch) 
 def test_a_node_that_joins_with_another_version_is_left_out_and_told(case: Case) -> None:
     told: list[str] = []
     executor = ClusterExecutor(Told([A]), told.append)
-    assert executor.able(case, A)
-    assert not executor.able(case, lab("c", "mujoco==9.9"))
-    assert told == ["c got no repetition of mujoco: it has version 9.9, and the run began with 4.0"]
+    repetition = executor.repetition(Experiment(case, Falling()), 1)
+    assert [repetition._able(node) for node in (A, lab("c", "mujoco==9.9"))] == [True, False]
+    assert told == ["c got no repetition: mujoco is 9.9 there, 4.0 here"]
 
 
 def test_waiting_ends_when_the_run_does() -> None:

@@ -9,7 +9,7 @@ import sys
 import tarfile
 import types
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -94,3 +94,8 @@ def archive(files: Mapping[str, bytes], path: Path) -> Path:
             item.size = len(content)
             packed.addfile(item, io.BytesIO(content))
     return path
+
+
+def edited(name: str, value: Any) -> Callable[[dict[str, Any]], None]:
+    """Puts a wrong value into the arrays of a data set."""
+    return lambda found: found.update({name: value})

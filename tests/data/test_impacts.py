@@ -13,6 +13,7 @@ from pytest_simbench.data import DataError, impacts
 from pytest_simbench.data.impacts import ANGLE_BIAS, SCALE, Impacts, clean_impacts, corner, tilt
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray
 from tests.conftest import measured
+from tests.data.samples import edited
 
 BEFORE, AFTER = np.array([-0.7, -2.4, 3.0]), np.array([-0.4, 0.9, -20.0])
 
@@ -90,10 +91,6 @@ def test_a_file_is_read_and_halves_are_of_even_and_odd_tosses(tmp_path: Path, na
     assert [item.toss for item in found.half("held_out")] == [3]
     assert found == impacts.read(tmp_path)
     assert found != Impacts(found.items[:1])
-
-
-def edited(name: str, value: Any) -> Callable[[dict[str, Any]], None]:
-    return lambda found: found.update({name: value})
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import pytest
 
 from pytest_simbench.data import DataError, Toss, Tosses, tosses
 from pytest_simbench.data.torch_file import MAGIC, VERSION, read_tensor
-from tests.data.samples import falling, torch_file
+from tests.data.samples import edited, falling, torch_file
 
 
 @pytest.fixture
@@ -52,10 +52,6 @@ def test_a_folder_without_tosses_is_none(tmp_path: Path) -> None:
 
 def arrays() -> dict[str, Any]:
     return {"toss_index": np.array([0, 1]), "length": np.array([2, 3]), "state": falling(5)}
-
-
-def edited(name: str, value: Any) -> Callable[[dict[str, Any]], None]:
-    return lambda found: found.update({name: value})
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -40,13 +39,6 @@ from tests.hostile import assert_harmless_terminal
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 SCENE = Scene("s", (cube("a", Pose.at(0.0, 0.0, 0.2), WHITE),))
-
-
-@pytest.fixture
-def handle(case: Case) -> Iterator[SimulatorHandle]:
-    handle = SimulatorHandle(case)
-    yield handle
-    handle.close()
 
 
 def test_one_worker_for_all_episodes(handle: SimulatorHandle) -> None:

@@ -82,6 +82,7 @@ def test_one_task_twice_in_a_test_and_good_settings(pytester: pytest.Pytester) -
         HEAD
         + """
 import numpy as np
+import unittest
 
 class Faster(Falling):
     '''Another one of the same name and parameters.'''
@@ -103,9 +104,16 @@ class TestSettings:
         settings = repeat(Falling()).records[0].settings
         assert settings["timestep"] == pytest.approx(0.01)
         assert settings["noslip_iterations"] == 3
+
+class TestCase(unittest.TestCase):
+    taken = pytest.fixture(autouse=True)(lambda self, repeat: None)
+
+    def test_it(self):
+        pass
 """
     )
-    result = run_pytest(pytester, "--sim=mujoco --reps=1", failed=1, passed=2)
+    result = run_pytest(pytester, "--sim=mujoco --reps=1", failed=1, passed=2, errors=1)
+    result.stdout.fnmatch_lines(["a fixture of a simulator was asked for by a TestCase, *"])
     result.stdout.fnmatch_lines(["repeat() is called for the task 'falling' a second time in one*"])
 
 
@@ -155,22 +163,3 @@ def test_settings_and_resources(pytester: pytest.Pytester) -> None:
         """
     )
     run_pytest(pytester, "--sim=mujoco", passed=1)
-
-
-def test_a_test_case_has_no_simulator(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        """
-        import pytest, unittest
-
-        def test_first(output_path):
-            pass
-
-        class TestIt(unittest.TestCase):
-            taken = pytest.fixture(autouse=True)(lambda self, repeat: None)
-
-            def test_it(self):
-                pass
-        """
-    )
-    result = run_pytest(pytester, "--sim=mujoco", passed=1, errors=1)
-    result.stdout.fnmatch_lines(["a fixture of a simulator was asked for by a TestCase, *"])

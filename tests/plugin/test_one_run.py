@@ -47,17 +47,13 @@ def test_a_folder_with_a_run_is_refused_before_anything_runs(pytester: pytest.Py
     assert {path: path.read_bytes() for path in before} == before
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [["--sim-output=o"], ["--sim-output=o", "-n1"], ["-osim_output=o", "-n1"]],
-    ids=["plain", "xdist", "ini"],
-)
-def test_two_processes_on_one_folder(pytester: pytest.Pytester, arguments: list[str]) -> None:
+@pytest.mark.parametrize("words", ["--sim-output=o", "--sim-output=o -n1", "-osim_output=o -n1"])
+def test_two_processes_on_one_folder(pytester: pytest.Pytester, words: str) -> None:
     pytester.makepyfile(TEST.replace("0.2", "30.0"))
-    command = [sys.executable, "-m", "pytest", "--sim=mujoco", "--reps=2"]
+    command = [sys.executable, "-m", "pytest", "--sim=mujoco", "--reps=2", *words.split()]
     both = [
         subprocess.Popen(
-            [*command, *arguments],
+            command,
             cwd=pytester.path,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

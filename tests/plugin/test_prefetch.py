@@ -68,23 +68,16 @@ def test_two_tests_run_at_once_and_each_record_is_there_once(
     assert len({test for test, _ in kept(folder)}) == len(kept(folder)) == 4
 
 
-def test_one_job_runs_one_after_the_other(
-    pytester: pytest.Pytester, folder: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("jobs", "own"), [(1, "repeats"), (2, "sim_settings")])
+def test_one_job_and_tests_with_settings_run_one_after_the_other(
+    pytester: pytest.Pytester, folder: Path, monkeypatch: pytest.MonkeyPatch, jobs: int, own: str
 ) -> None:
     monkeypatch.setenv("ALONE", "yes")
-    run(pytester, passed=4)
+    with (folder / "test_it.py").open("a") as file:
+        file.write(f"\n{own} = pytest.fixture(lambda: {{'timestep': 0.01}})\n")
+    run(pytester, f"--sim-jobs={jobs}", passed=4)
     spans = [tuple(map(float, line.split())) for line in (folder / "spans").open()]
     assert all(one[1] <= other[0] for one, other in pairwise(sorted(spans)))
-
-
-def test_one_with_settings_of_its_own_does_not_begin_before(
-    pytester: pytest.Pytester, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("ALONE", "yes")
-    own = "\nsim_settings = pytest.fixture(lambda: {'timestep': 0.01})\n"
-    (folder / "test_it.py").write_text(dedent(TEST) + own)
-    run(pytester, "--sim-jobs=2", passed=4)
-    assert len((folder / "spans").read_text().splitlines()) == 4
 
 
 def test_a_mark_that_names_no_task_is_an_error(pytester: pytest.Pytester, folder: Path) -> None:

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.client.environments import MARKER, Environment
 from pytest_simbench.plugin.selection import select
-from pytest_simbench.simulator.registry import adapter
 from tests.cli.command import simbench
+from tests.cluster.machines import release_in
 from tests.plugin.inner import records, run_pytest, usage_error, wrapper
 from tests.plugin.planted import plant
 
@@ -20,12 +19,7 @@ from tests.plugin.planted import plant
 def release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """The release that is installed here, in an environment of its own that is but a wrapper."""
     monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path / "environments"))
-    name = f"mujoco=={adapter('mujoco').info.tested_version}"
-    environment = Environment.of(adapter(name).info)
-    wrapper(environment.python)
-    told = {"requirements": list(environment.info.requirements)}
-    (environment.folder / MARKER).write_text(json.dumps(told))
-    return name
+    return release_in(tmp_path / "environments")
 
 
 def test_versions_side_by_side(pytester: pytest.Pytester, release: str) -> None:
