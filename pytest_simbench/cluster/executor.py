@@ -34,7 +34,8 @@ from pytest_simbench.experiment.repetition import AnyRepetition, Ended, Hooks
 from pytest_simbench.recordings.trace import FOLDER as TRACES
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.paths import write_whole
-from pytest_simbench.records.record import Failure, Record, Status
+from pytest_simbench.records.record import Failure, Record, Status, plain
+from pytest_simbench.tasks.recorded import code_of
 from pytest_simbench.worker.wire import told
 
 ATTEMPTS = 2
@@ -58,19 +59,19 @@ class Shared:
 
     Attributes:
         job: goes to the nodes.
-        of_robot: attributes of its records that tell of its robot's files: here, not on the node.
+        known: attributes of its records that tell of files which are here, not on the node.
     """
 
     job: Packed
-    of_robot: Mapping[str, Any]
+    known: Mapping[str, Any]
 
     @classmethod
     def of(cls, experiment: Experiment, client: str) -> Shared:
         task, robot = experiment.task, experiment.robot
-        told: dict[str, Any] = {}
+        known: dict[str, Any] = {"code": code_of(task)}
         if robot is not None:
-            told = {"scene": scene_digest(task), "robot": describe_robot(robot)}
-        return cls(Job.of(experiment, client).pack(), told)
+            known |= {"scene": scene_digest(task), "robot": describe_robot(robot)}
+        return cls(Job.of(experiment, client).pack(), known)
 
 
 class ClusterExecutor(Executor):
@@ -250,14 +251,15 @@ class RemoteRepetition:
         """The record that a node sent, with what only this side knows; its files are written."""
         assert self._node is not None
         record = Record.from_json(answer["record"], f"the answer of {self._node.name}")
-        of_robot = self._shared(self.experiment).of_robot
+        known = dict(self._shared(self.experiment).known)
+        known["settings"] = {**record.settings, **plain(self.experiment.task.parameters())}
         stem = file_stem(self.experiment, self.number)
         self._keep(record.notes.log, "logs", answer["log"])
         problem = self._keep(f"{TRACES}/{stem}.npz", TRACES, answer["trace"])
         if problem:
             record = record.noting(trace=f"the trace could not be written: {problem}")
         host = {**record.host, "node": self._node.name}
-        record = replace(record.noting(lost_nodes=tuple(self._lost)), host=host, **of_robot)
+        record = replace(record.noting(lost_nodes=tuple(self._lost)), host=host, **known)
         return record, error_from_wire(answer["error"], self.where)
 
     def _keep(self, name: str, folder: str, data: bytes | None) -> str:
