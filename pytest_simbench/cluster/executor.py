@@ -68,7 +68,7 @@ class Shared:
     @classmethod
     def of(cls, experiment: Experiment, client: str) -> Shared:
         task, robot = experiment.task, experiment.robot
-        known: dict[str, Any] = {"code": code_of(task)}
+        known: dict[str, Any] = {"task_code": code_of(task)}
         if robot is not None:
             known |= {"scene": scene_digest(task), "robot": describe_robot(robot)}
         return cls(Job.of(experiment, client).pack(), known)

@@ -23,7 +23,7 @@ from pytest_simbench.ground.versions import VersionedName
 from pytest_simbench.records.configuration import text
 from pytest_simbench.records.record import Record, Status, plain
 from pytest_simbench.records.series import short
-from pytest_simbench.scene import MotionLimits, Pose, Robot
+from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter, address, settings_of
 from pytest_simbench.tasks.base import Jitter, Task
 from pytest_simbench.tasks.recorded import code_of
@@ -58,7 +58,7 @@ def record_of(
         settings={**settings, **experiment.task.parameters()},
         versions={"pytest-simbench": __version__, **versions},
         scene=scene_digest(experiment.task),
-        code=code_of(experiment.task),
+        task_code=code_of(experiment.task),
         robot=describe_robot(experiment.robot),
         limits=experiment.limits,
         contended=case.contended,
@@ -105,20 +105,17 @@ def describe_robot(robot: Robot | None) -> dict[str, str]:
     """Name of a robot and twelve digits of everything that it is; empty for a task's own robot."""
     if robot is None:
         return {}
-    return dict(_describe_robot(robot, robot.limits, robot.swing, robot.stand))
+    return {"name": robot.name, "digest": _robot_digest(robot)}
 
 
 @robot_cache
-def _describe_robot(
-    robot: Robot, limits: MotionLimits | None, swing: object, stand: Pose | None
-) -> dict[str, str]:
-    """The same; what is no part of a robot's equality is an argument."""
+def _robot_digest(robot: Robot) -> str:
     wire = with_content({"robot": robot.to_wire()}, robot)["robot"]
     meshes = sorted(wire[CONTENT].pop("meshes"))  # named by their content
-    bounds = asdict(limits) if limits else None
-    others = [*([swing] if swing else []), *([stand.to_wire()] if stand else [])]
+    bounds = asdict(robot.limits) if robot.limits else None
+    others = [*filter(None, [robot.swing, robot.stand and robot.stand.to_wire()])]
     data = json.dumps([wire, meshes, bounds, *others])
-    return {"name": robot.name, "digest": hashlib.sha256(data.encode()).hexdigest()[:12]}
+    return hashlib.sha256(data.encode()).hexdigest()[:12]
 
 
 def scene_digest(task: Task) -> str:

@@ -68,7 +68,7 @@ PARTS: tuple[ConfigurationField, ...] = (
         f"{EVERYWHERE} rank",
         "a task whose code changed builds another world by the same name",
     ),
-    _part("code", f"{EVERYWHERE} rank", "a task that counts or acts otherwise is another one"),
+    _part("task_code", f"{EVERYWHERE} rank", "one that counts or acts otherwise is another one"),
     _part("robot", f"{EVERYWHERE} rank", "another arm or hand is another experiment"),
     _part("limits", EVERYWHERE, "a time-out decides which repetitions fail"),
     _part("versions", EVERYWHERE, "another engine, adapter or Python is another simulator"),
@@ -121,7 +121,7 @@ def equal_to(use: Use) -> tuple[str, ...]:
 LATE = frozenset({"versions", "deviations"})
 """Told by the engine: a repetition that failed may have ended before it knew all of them."""
 
-NEW = frozenset({"scene", "limits", "code"})
+NEW = frozenset({"scene", "limits", "task_code"})
 """Not in records of pytest-simbench before 0.1.0's release: what is not there is not known."""
 
 TASK = "task."

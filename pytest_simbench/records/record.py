@@ -73,7 +73,7 @@ class Record:
         notes: what the tool notes.
         reasons: why the score is no better, in the task's words.
         scene: digest of the task's scene for one seed and no jitter; empty where not known.
-        code: digest of the source of a task of the user's; empty for one of ours.
+        task_code: digest of the source of a task of the user's; empty for one of ours.
         robot: its `name` and the `digest` of its description; empty for the task's own robot.
         limits: `timeout`, `stall_timeout` [s] and `memory_limit` [MB]; empty where not known.
         attempt: how often this process had begun the same repetitions, with this time: a plugin
@@ -105,7 +105,7 @@ class Record:
     settings: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     scene: Name = ""
-    code: Name = ""
+    task_code: Name = ""
     robot: Mapping[str, str] = field(default_factory=dict)
     limits: Mapping[str, float | None] = field(default_factory=dict)
     attempt: Positive = 1
@@ -167,7 +167,7 @@ class Record:
         data: dict[str, Any] = {"schema": SCHEMA}
         for item in fields(self):
             value = getattr(self, item.name)
-            if item.name != "extra" and (value or item.name not in ("robot", "code")):
+            if item.name != "extra" and (value or item.name not in ("robot", "task_code")):
                 data[item.name] = value
         data["error"] = None if self.error is None else asdict(self.error)
         noted = asdict(self.notes)

@@ -84,7 +84,7 @@ def test_the_tasks_parameters_scene_and_code_are_compared(case: Case, save: Save
     resumed.tasks["falling"] = TaskDescription("falling", (replace(landed, unit="mm"),))
     with pytest.raises(NotResumed, match="unit of the metric landed of falling was "):
         resumed.take(Experiment(case, Falling()), None)
-    for name in ("scene", "code"):
+    for name in ("scene", "task_code"):
         with pytest.raises(NotResumed, match=f"{name} was "):
             save(*ended(case, Falling(), 2, **{name: "of another task"})).take(
                 Experiment(case, Falling()), None
@@ -186,7 +186,7 @@ def test_each_attempt_gets_its_own(case: Case, save: Save) -> None:
 
 
 def test_records_of_before_scene_and_limits_were_kept_go_on(case: Case, save: Save) -> None:
-    old = ended(case, Falling(), 1, scene="", code="", limits={})
+    old = ended(case, Falling(), 1, scene="", task_code="", limits={})
     assert len(save(*old).take(Experiment(case, Falling()), None)) == 1
 
 

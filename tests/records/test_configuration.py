@@ -34,7 +34,7 @@ ANOTHER: dict[str, Any] = {
     "protocol": "paper",
     "jitter": 50.0,
     "scene": "another",
-    "code": "another",
+    "task_code": "another",
     "robot": {"name": "ur5", "digest": "12ab"},
     "limits": {"timeout": 5.0},
     "versions": {"engine": "2.0"},
@@ -47,7 +47,7 @@ ANOTHER: dict[str, Any] = {
 
 
 def whole(**changes: Any) -> Record:
-    return record(scene="one", code="one", limits={"timeout": 4.0}, **changes)
+    return record(scene="one", task_code="one", limits={"timeout": 4.0}, **changes)
 
 
 def test_every_field_of_a_record_has_its_line_and_reason() -> None:
@@ -66,7 +66,7 @@ def test_records_agree_as_the_table_says(use: Use, name: str) -> None:
 
 def test_a_configuration_is_equal_for_pooling_resuming_and_merging() -> None:
     configuration = {"profile", "settings", "protocol", "jitter", "scene", "robot", "limits"}
-    configuration |= {"versions", "code"}
+    configuration |= {"versions", "task_code"}
     assert set(equal_to("pool")) == set(equal_to("resume")) == configuration
     assert set(equal_to("merge")) == {*configuration, "deviations"}
     circumstances = {"deviations", "host", "contended", "reused_worker"}
@@ -74,7 +74,7 @@ def test_a_configuration_is_equal_for_pooling_resuming_and_merging() -> None:
 
 
 def test_simulators_are_ranked_where_the_same_was_asked_of_them() -> None:
-    ranked = {"mode", "profile", "settings", "protocol", "jitter", "scene", "code", "robot"}
+    ranked = {"mode", "profile", "settings", "protocol", "jitter", "scene", "robot", "task_code"}
     assert set(equal_to("rank")) == ranked
     other = whole(simulator="b", versions={"b": "1"}, settings={"substeps": 4, "task.towers": 3})
     ours = whole(settings={"timestep": 0.004, "task.towers": 3})
