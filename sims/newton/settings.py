@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
-from pytest_simbench.simulator import Seen, Settings
+from pytest_simbench.simulator import Seen, Settings, chosen_on
 from pytest_simbench.simulator.settings import EACH, Log
 
 from ..mujoco.settings import FileSettings, Solimp
@@ -53,6 +53,7 @@ TUNED = NewtonSettings(
     ke=250000.0,
     kd=1000.0,
     solimp=(0.99, 0.9999, 0.001),
+    multiccd=True,
     gap=0.0,
 )
 
@@ -63,4 +64,4 @@ PROFILES: Mapping[str, Settings] = {
     "file": FileSettings(),
 }
 
-CHOSEN_ON: Mapping[str, tuple[Seen, ...]] = {"real": (Seen.motions("cube_tosses", 0, 564, 6),)}
+CHOSEN_ON = chosen_on(Seen.seeds("carrying", 1, 5))

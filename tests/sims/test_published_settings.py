@@ -32,8 +32,8 @@ PUBLISHED = {
     },
     "newton": {
         "default": "bddba8dd",
-        "tuned": "ea91e0b9",
-        "real": "4e0243a1",
+        "tuned": "2cd5fcfb",
+        "real": "0c3f8545",
         "file": "aeed4602",
     },
     "ode": {"default": "f1f2c655", "tuned": "7c840eea", "real": "85bf7f2e"},
