@@ -7,20 +7,21 @@ process saw it first, and a policy's own numbers, texts, lists and arrays as the
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import inspect
-import json
 import re
 import sys
+import textwrap
 import weakref
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from logging import Logger
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from threading import Lock
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,7 @@ def digest(policy: Any, known: Known | None = None, depth: int = DEPTH) -> str:
     with suppress(TypeError, ValueError):
         held |= inspect.getclosurevars(made).nonlocals
         held |= {"defaults": made.__defaults__, "keywords": made.__kwdefaults__}
-    text += _source(inspect.unwrap(made) if inspect.isroutine(made) else type(made))
+    text += _source(inspect.unwrap(made) if inspect.isroutine(made) else type(made), depth)
     if not hasattr(made, "__dict__"):  # a date, say
         text.append(re.sub("( at)? 0x[0-9a-fA-F]+", "", repr(made)))
     for name, value in sorted(held.items()):
@@ -100,13 +101,13 @@ def _short(text: Iterable[str]) -> str:
     return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]
 
 
-def _source(written: Any) -> list[str]:
+def _source(written: Any, depth: int = DEPTH) -> list[str]:
     """Of a class, with those that it inherits from and that come with neither Python nor this
     package, or of a function."""
     known = {_package(recorded), *sys.stdlib_module_names}
     parts = written.__mro__ if isinstance(written, type) else [written]
     of = [part for part in parts if part is written or _package(part) not in known]
-    return [line for part in of for line in _code(part)]
+    return [line for part in of for line in _code(part, depth)]
 
 
 def _at_first(value: Any) -> str:
@@ -129,30 +130,92 @@ def _package(made: Any) -> str:
     return str(getattr(made, "__module__", "")).partition(".")[0]
 
 
-@lru_cache(maxsize=64)
-def _code(written: Any) -> tuple[str, ...]:
-    """The source of a class or a function, and numbers, texts, rows of them and functions that it
-    takes from modules of its own package, as they were when it was seen first."""
+@lru_cache(maxsize=256)
+def _code(written: Any, depth: int) -> tuple[str, ...]:
+    """The source of a class or a function, and what it takes from modules: data, objects, and code
+    of the user's, as they were when it was seen first; of what is installed its version."""
+    if not _is_own(written):
+        version = getattr(sys.modules.get(_package(written)), "__version__", "")
+        return _text(written), str(version)
     found: list[str] = []
-    waiting = [written]
+    waiting, known = [written], Known()
     for part in waiting:
-        with suppress(OSError, TypeError), _PARSING:
-            found.append(inspect.getsource(getattr(part, "__code__", part)))
-        if getattr(part, "__name__", "") == "<lambda>":  # several may stand in one line
-            code = part.__code__
-            constants = [c for c in code.co_consts if not inspect.iscode(c)]
-            found.append(f"{code.co_code.hex()} {code.co_names} {constants}")
-        for function in filter(inspect.isfunction, [part, *getattr(part, "__dict__", {}).values()]):
-            with suppress(TypeError, ValueError):
-                for name, value in sorted(inspect.getclosurevars(function).globals.items()):
-                    if isinstance(value, int | float | str | bytes):
-                        found.append(f"{name}={value!r}")
-                    elif isinstance(value, tuple | list | dict):
-                        with suppress(TypeError, ValueError):  # it holds objects
-                            found.append(f"{name}={json.dumps(value)}")
-                    elif inspect.isfunction(value) and _package(value) == _package(written):
-                        waiting += [value] * (value not in waiting)
+        found.append(_text(part))
+        for name, value in sorted((_members if isinstance(part, type) else _taken)(part).items()):
+            value = inspect.unwrap(value) if callable(value) else value
+            if inspect.isfunction(value) or isinstance(value, type):
+                waiting += [value] * (_is_own(value) and value not in waiting)
+            elif depth and not (inspect.isbuiltin(value) or isinstance(value, NAMED)):
+                with suppress(Exception):  # objects of others raise what they like
+                    found.append(f"{name}={_packed(value, known, depth - 1)!r}")
     return tuple(found)
+
+
+def _text(part: Any) -> str:
+    """Its source as Python lays it out, without comments; where that does not tell it, the code."""
+    code = getattr(part, "__code__", None)
+    if code and code.co_filename == "<string>" and code.co_name.startswith("__"):
+        return ""  # a dataclass makes it of its fields
+    text = ""
+    with suppress(OSError, TypeError, SyntaxError), _PARSING:
+        text = inspect.getsource(code or part)
+        text = ast.unparse(ast.parse(textwrap.dedent(text)))
+    if code and (not text or code.co_name == "<lambda>"):  # several may stand in one line
+        text += "".join(
+            f"{one.co_code.hex()} {one.co_names} {[_constant(c) for c in one.co_consts]}"
+            for one in _codes(code)
+        )
+    return text
+
+
+def _codes(code: CodeType) -> list[CodeType]:
+    """Of a function and of what is written in it."""
+    inner = filter(inspect.iscode, code.co_consts)
+    return [code, *(each for one in inner for each in _codes(one))]
+
+
+def _constant(value: Any) -> Any:
+    if isinstance(value, frozenset):  # in another order in each process
+        return sorted(map(repr, value))
+    return None if inspect.iscode(value) else value
+
+
+def _members(kind: type) -> dict[str, Any]:
+    """What a class holds, its functions as they were written."""
+    found: dict[str, Any] = {}
+    for name, value in vars(kind).items():
+        if isinstance(value, staticmethod | classmethod):
+            value = value.__func__
+        elif isinstance(value, property | cached_property):
+            value = value.fget if isinstance(value, property) else value.func
+        if callable(value) or not name.startswith("_"):
+            found[name] = value
+    return found
+
+
+def _taken(function: Any) -> dict[str, Any]:
+    """What a function's code names: of its module, of modules of the user's, and of functions that
+    it was made in."""
+    if not inspect.isfunction(function):
+        return {}
+    names = {name for code in _codes(function.__code__) for name in code.co_names}
+    space = function.__globals__
+    found = {name: space[name] for name in names if name in space}
+    for module in [m for m in found.values() if isinstance(m, ModuleType) and _is_own(m)]:
+        found |= {f"{module.__name__}.{n}": getattr(module, n) for n in names if hasattr(module, n)}
+    with suppress(ValueError):
+        found |= inspect.getclosurevars(function).nonlocals
+    return found
+
+
+def _is_own(made: Any) -> bool:
+    """Whether a module, class or function is the user's: neither ours, nor Python's, nor
+    installed."""
+    name = made.__name__ if isinstance(made, ModuleType) else str(made.__module__)
+    file = getattr(sys.modules.get(name), "__file__", None) or ""
+    installed = {"site-packages", "dist-packages"} & {*Path(file).parts}
+    known = {_package(recorded), *sys.stdlib_module_names}
+    return not (installed or name.partition(".")[0] in known)
 
 
 def _packed(value: Any, known: Known | None, depth: int) -> Any:
@@ -173,6 +236,8 @@ def _packed(value: Any, known: Known | None, depth: int) -> Any:
         flat = value.reshape(-1)
         seen = flat[:: 1 + len(flat) // WEIGHTS].tolist()
         return [*value.shape], _packed(seen, known, depth)
+    if isinstance(value, PurePath):
+        return str(value).removeprefix(f"{Path.cwd()}/")
     if known is None:
         return _at_first(value)
     if id(value) not in known:
