@@ -137,6 +137,7 @@ class PyBullet(Simulator):
         self._bodies = {body.name: add_body(c, body, s, heavy(scene)) for body in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[body.name] for body in scene.prescribed_bodies]
+        self._before, self._falls = np.empty((0, 13)), s.timestep * np.asarray(scene.gravity)
         self._part_from_still(scene)
         self._robot = -1
         self._anchors: Anchors | None = None
@@ -242,14 +243,14 @@ class PyBullet(Simulator):
             pybullet.applyExternalTorque(body, -1, torque, pybullet.WORLD_FRAME, c)
 
     def lead(self, before: FloatArray, after: FloatArray) -> None:
-        c, falls = self.client, self.settings.timestep * np.asarray(self.scene.gravity)
-        for body, row in zip(self._led, before, strict=True):
-            w, x, y, z = row[3:7]
-            pybullet.resetBasePositionAndOrientation(body, row[:3], [x, y, z, w], c)
-            # Bullet has one gravity for all, which acts before contacts do
-            pybullet.resetBaseVelocity(body, row[7:10] - falls, row[10:], c)
+        self._before = before
 
     def step(self) -> None:
+        for body, row in zip(self._led, self._before, strict=False):
+            w, x, y, z = row[3:7]
+            pybullet.resetBasePositionAndOrientation(body, row[:3], [x, y, z, w], self.client)
+            # Bullet has one gravity for all, which acts before contacts do
+            pybullet.resetBaseVelocity(body, row[7:10] - self._falls, row[10:], self.client)
         if self._pushed is not None:
             self._pushed.push()
         for link, force in self._borne.items():
