@@ -148,6 +148,7 @@ class OvPhysX(Simulator):
         self._start()
         self._free = [usd.body_path(i) for i, box in enumerate(scene.bodies) if not box.fixed]
         self._led = [usd.body_path(i) for i, box in enumerate(scene.bodies) if box.prescribed]
+        self._prescribed = {k: b.velocity for k, b in enumerate(scene.free_bodies) if b.prescribed}
         self._still = {  # kinematic too, so they must be given a target with the others
             usd.body_path(i): box.pose.as_array() for i, box in enumerate(scene.bodies) if box.fixed
         }
@@ -261,6 +262,8 @@ class OvPhysX(Simulator):
             for kind, columns in (("POSE", slice(0, 7)), ("VELOCITY", slice(7, 13))):
                 state[:, columns] = self._read(f"RIGID_BODY_{kind}")
         state[:, 3:7] = state[:, [6, 3, 4, 5]]
+        for k, velocity in self._prescribed.items():  # PhysX has it after a step alone
+            state[k, 7:] = velocity
         return state
 
     def joint_state(self) -> FloatArray:

@@ -18,7 +18,7 @@ from pytest_simbench.sims.sapien.bodies import ROBOT, WORLD, groups_apart
 from pytest_simbench.sims.sapien.readback import _compatible
 
 from pytest_simbench.laws.mechanisms import Part, Y, mechanism
-from pytest_simbench.scene import Box, Coupling, FloatArray, Pose, Scene
+from pytest_simbench.scene import Coupling, FloatArray, Scene
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.testing import joints, scenes
@@ -153,13 +153,6 @@ def test_what_was_before_a_restore_leaves_no_trace(
             futures.append((future(simulator, 100), simulator.joint_state()))
     assert np.array_equal(futures[0][0], futures[1][0])
     assert np.array_equal(futures[0][1], futures[1][1])
-
-
-def test_a_restored_belt_has_its_velocity() -> None:
-    belt = Box("belt", (1.0, 0.4, 0.1), Pose(), prescribed=True, linear_velocity=(0.3, 0.0, 0.0))
-    with world(Scene("belt", (belt,))) as simulator:
-        simulator.restore(simulator.save())
-        assert simulator.body_state()[0, 7:] == pytest.approx(belt.velocity)
 
 
 def test_bodies_are_read_in_one_call_as_each_tells_itself() -> None:
