@@ -218,28 +218,30 @@ class Rhythm:
         every = _whole(period / timestep)
         if not every:
             n = max(1, int(period / timestep))
-            near = " or ".join(f"{1 / (k * timestep):.6g} Hz" for k in (n, n + 1))
+            near = " or ".join(f"{1 / (k * timestep):.7g} Hz" for k in (n, n + 1))
             raise LoopError(
                 f"a policy at {self.rate:g} Hz is asked every {1e3 * period:.4g} ms, which is no "
                 f"multiple of the time step of {1e3 * timestep:.4g} ms; choose {near}, or "
                 "another time step"
             )
-        late, old = _whole(self.command_latency / timestep), _whole(self.observation_delay / period)
-        if late is None:
-            raise LoopError(
-                f"a command_latency of {self.command_latency:g} s is no multiple of the time step "
-                f"of {timestep:.6g} s"
-            )
-        if old is None:
-            raise LoopError(
-                f"an observation_delay of {self.observation_delay:g} s is no multiple of the "
-                f"policy's period of {period:.6g} s"
-            )
+        late = _multiple(self.command_latency, "command_latency", timestep, "time step")
+        old = _multiple(self.observation_delay, "observation_delay", period, "policy's period")
         return every, late, old
 
 
 def _whole(number: float) -> int | None:
     return round(number) if abs(number - round(number)) < 1e-6 * max(1.0, number) else None
+
+
+def _multiple(value: float, name: str, length: float, of: str) -> int:
+    """How many times a length makes a value [both s]."""
+    count = _whole(value / length)
+    if count is None:
+        near = " or ".join(f"{(value // length + k) * length:.7g} s" for k in (0, 1))
+        raise LoopError(
+            f"{name}={value:g} s is no multiple of the {of} of {length:.7g} s; choose {near}"
+        )
+    return count
 
 
 def checked(value: Any, what: str, *, above: bool = False) -> float:

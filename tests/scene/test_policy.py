@@ -38,8 +38,8 @@ def test_a_rhythm_of_whole_steps_is_told_in_steps(steps: int, timestep: float) -
     ("rhythm", "told"),
     [
         (Rhythm(50.0), "no multiple of the time step of 4.167 ms; choose 60 Hz or 48 Hz"),
-        (Rhythm(10.0, 0.003), "a command_latency of 0.003 s is no multiple of the time step"),
-        (Rhythm(10.0, 0.0, 0.15), "an observation_delay of 0.15 s is no multiple of the policy's"),
+        (Rhythm(10.0, 0.01), "time step of 0.004166667 s; choose 0.008333333 s or 0.0125 s"),
+        (Rhythm(10.0, 0.0, 0.15), "the policy's period of 0.1 s; choose 0.1 s or 0.2 s"),
     ],
 )
 def test_another_is_refused(rhythm: Rhythm, told: str) -> None:
