@@ -28,7 +28,7 @@ LOOKS = 10
 FORCE_JITTER = Metric(
     "force_jitter", "restless forces", unit="%", least=0, better="lower",
     doc=f"spread of the forces of contacts over {LOOKS} looks in the last {RESTLESS:g} s, of the "
-        "weight of all free bodies; of simulators that tell them",
+        "weight of all free bodies; of simulators that tell them, where not all sleeps by then",
 )  # fmt: skip
 
 Forces = Mapping[tuple[str, str], FloatArray]
@@ -45,7 +45,7 @@ def rest(world: World, seconds: float, phase: str) -> Motion:
 
 def calm(world: World, seconds: float, phase: str) -> tuple[Motion, list[Forces]]:
     """The same, and the forces of contacts now and then in that motion; none where the simulator
-    does not tell them of this scene."""
+    does not tell them of this scene, or all sleeps from the first look on, which changes none."""
     with world.phase(phase):
         world.wait(seconds - RESTLESS)
     parts: list[Motion] = []
@@ -58,7 +58,8 @@ def calm(world: World, seconds: float, phase: str) -> tuple[Motion, list[Forces]
             found = told_forces(world) if k == 1 or forces else None
             if found is not None:
                 forces.append(_with_asleep(world, found, forces[-1] if forces else {}))
-    return Motion.joined(parts), forces
+    awake = any(part.bodies[:, :, 7:].any() for part in parts[1:])
+    return Motion.joined(parts), forces if awake else []
 
 
 def _with_asleep(world: World, found: Forces, before: Forces) -> Forces:

@@ -130,10 +130,18 @@ class Restless(Moved):
         return [("body/slab", "ground", np.array([0, 0, 20 + (-1) ** len(self.asked), 0, 0, 0]))]
 
 
-def test_what_falls_asleep_is_held_by_the_forces_of_before() -> None:
-    process, told = ScriptedProcess(), [("body/slab", "ground", np.array([0, 0, 10.0, 0, 0, 0]))]
-    process.do_contact_forces = lambda: [told.pop()] if told else []  # type: ignore[attr-defined]
-    assert perform(Settling(SCENE), process=process)[0].metrics["force_jitter"] == 0.0
+@pytest.mark.parametrize(("awake", "spreads"), [(2, 0.0), (0, None)])
+def test_what_falls_asleep_is_held_by_the_forces_of_before(awake: int, spreads: Any) -> None:
+    """After so many looks; what slept at the first one was not measured."""
+    process = ScriptedProcess()
+    looks = [("body/slab", "ground", np.array([0, 0, 10.0, 0, 0, 0]))] * awake
+
+    def told() -> list[Any]:
+        process.velocities["slab"][0] = 0.01 * (len(looks) > 1)
+        return [looks.pop()] if looks else []
+
+    process.do_contact_forces = told  # type: ignore[method-assign]
+    assert perform(Settling(SCENE), process=process)[0].metrics["force_jitter"] == spreads
 
 
 def test_the_whole_score_of_what_ends_elsewhere() -> None:
