@@ -45,6 +45,9 @@ SAFE = "import sys;sys.path[:1]=filter(None,sys.path[:1]);exec("
 MOST_WAITING = 16
 """Messages that may wait to be read. A worker answers one request at a time: more is a flood."""
 
+CALM = {"OPENBLAS_THREAD_TIMEOUT": "4"}
+"""numpy's threads sleep when they are done, not 30 ms later: who steps next would pay for that."""
+
 GOODBYE_TIMEOUT = 0.5
 """For execnet's threads to notice that the process is gone [s]; what is left is left to itself."""
 
@@ -144,9 +147,8 @@ class Connection:
             # A session of its own: Ctrl-C is for pytest, which decides what becomes of workers.
             if self._theirs is not None:
                 pipes["pass_fds"] = (stack.enter_context(self._theirs).fileno(),)
-            self.popen = subprocess.Popen(
-                command, env={**os.environ, **self._environment}, start_new_session=True, **pipes
-            )
+            variables = {**CALM, **os.environ, **self._environment}
+            self.popen = subprocess.Popen(command, env=variables, start_new_session=True, **pipes)
         if self._cut:  # meanwhile
             self.popen.kill()
         return self.popen

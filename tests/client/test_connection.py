@@ -11,12 +11,13 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
 import psutil
 import pytest
 from execnet.gateway_io import popen_bootstrapline
 
-from pytest_simbench.client.connection import BOOTSTRAP, Connection
+from pytest_simbench.client.connection import BOOTSTRAP, OPENED, Connection
 from pytest_simbench.client.errors import Where
 from pytest_simbench.client.launch import Launch
 from pytest_simbench.client.process import WorkerProcess
@@ -62,6 +63,22 @@ def test_an_error_that_nobody_asked_for_is_not_printed(tmp_path: Path) -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     assert (done.stdout, done.stderr) == ("True\n", "")
+
+
+def test_threads_that_multiplied_matrices_do_not_wait_at_full_speed(tmp_path: Path) -> None:
+    """A policy inside the worker begins them, and the steps after it would count their time."""
+    module = ModuleType("module")
+    module.__file__ = str(tmp_path / "there.py")
+    Path(module.__file__).write_text(
+        "import time, numpy as np; np.ones((900, 900)) @ np.ones((900, 900))\n"
+        "before = time.process_time(); time.sleep(0.1); spent = time.process_time() - before\n"
+        "if __name__ == '__channelexec__': channel.send(spent)\n"
+    )
+    connection = Connection(None, None, {}, None)
+    connection.open(module, {})
+    assert [connection.receive(60.0), connection.receive(60.0) < 0.005] == [OPENED, True]
+    connection.cut()
+    connection.close()
 
 
 def test_the_mark_that_ends_a_loop_is_read_before_the_answer_that_is_here_already() -> None:
