@@ -116,8 +116,8 @@ def run(
             try:
                 repeater.up_to(experiment.repetitions(wanted), found)
             except (Unavailable, WorldParityError, LoopError) as error:
-                what = error if isinstance(error, LoopError) else error.what
-                problems.append(f"{experiment.case.simulator}: {what}")
+                told = getattr(error, "what", error)  # without the place, where it has one
+                problems.append(f"{experiment.case.simulator}: {told}")
             except (KeyboardInterrupt, Exception) as error:  # Ctrl-C, or a fault of the task
                 error.add_note(f"records are kept: folder={str(place.path)!r}, resume=True goes on")
                 raise

@@ -275,7 +275,7 @@ def _locked(output: str | None) -> RunFolder:
             folder.inside(name)
     except FolderError as error:
         folder.release()
-        raise BadInput(str(error).replace("--sim-output", "--output")) from None
+        raise BadInput(f"--output: {error}") from None
     if folder.holds_run:
         folder.release()
         raise BadInput(f"{folder.path} already holds a run; give another --output")

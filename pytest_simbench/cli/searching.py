@@ -46,7 +46,7 @@ def runs_in(path: Path, executor: Executor) -> Iterator[Runs]:
         BadInput: it cannot be; or it holds another run.
     """
     folder = RunFolder(path)
-    with refusing(FolderError, kind=lambda why: BadInput(why.replace("--sim-output", "--output"))):
+    with refusing(FolderError, "--output"):
         folder.lock()
     advice = "begin anew in another folder: --output DIR"
     with closing(folder), refusing(NotResumed, kind=lambda why: BadInput(f"{why}; {advice}")):

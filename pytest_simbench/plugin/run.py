@@ -116,7 +116,7 @@ class Run:
         """
         if self.folder.locked:
             return
-        with options.refusing(FolderError):
+        with options.refusing(FolderError, "--sim-output"):
             self.folder.lock(shared=self._shared_by is not None)
         if self._shared_by is not None:
             return

@@ -36,7 +36,7 @@ class FolderLock:
         except OSError as error:
             raise FolderError(
                 f"the run folder {folder} cannot be made ({_reason(folder, error)}); give another "
-                "--sim-output"
+                "folder"
             ) from None
         try:
             self._take(shared)
@@ -55,7 +55,7 @@ class FolderLock:
             if not shared:  # else it is the controller of this run that holds it
                 raise FolderError(
                     f"another run is under way in {self.folder}; wait for it, or give another "
-                    "--sim-output"
+                    "folder"
                 ) from None
         except OSError as error:
             if error.errno not in (errno.ENOTSUP, errno.ENOLCK, errno.EBADF, errno.EINVAL):
@@ -82,8 +82,7 @@ def _probe(folder: Path) -> None:
             os.fsync(file.fileno())
     except OSError as error:
         raise FolderError(
-            f"the run folder {folder} cannot be written to ({error.strerror}); give another "
-            "--sim-output"
+            f"the run folder {folder} cannot be written to ({error.strerror}); give another folder"
         ) from None
 
 

@@ -125,7 +125,7 @@ def test_a_run_that_is_written_to_is_no_destination(here: Path) -> None:
         merge("a")
     lock.close()
     (here / "whole").write_text("")
-    with pytest.raises(BadInput, match="whole is a file\\); give another --output$"):
+    with pytest.raises(BadInput, match="whole is a file\\); give another folder$"):
         merge("a")
 
 

@@ -75,7 +75,7 @@ def test_what_can_be_no_folder_is_one_sentence(tmp_path: Path, kind: str) -> Non
     }[kind]
     with pytest.raises(FolderError) as caught:
         FolderLock(path)
-    expected = f"the run folder {path} cannot be made ({message}); give another --sim-output"
+    expected = f"the run folder {path} cannot be made ({message}); give another folder"
     assert str(caught.value) == expected
 
 
@@ -93,5 +93,5 @@ FolderLock(Path(sys.argv[1]))
         [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False
     )
     assert "FolderError: the run folder" in done.stderr
-    assert "cannot be written to (File too large); give another --sim-output" in done.stderr
+    assert "cannot be written to (File too large); give another folder" in done.stderr
     assert list(tmp_path.iterdir()) == []
