@@ -33,7 +33,7 @@ from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import RecordError
 from pytest_simbench.records.tuned_on import FIRST_SEED
 from pytest_simbench.report.files import write_outcome
-from pytest_simbench.report.model.outcome import RunOutcome, looks_at
+from pytest_simbench.report.model.outcome import RunOutcome, begun, looks_at
 from pytest_simbench.scene import Robot
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.simulator.registry import adapter, known
@@ -112,6 +112,7 @@ def run(
             found = resumed.take(experiment, wanted) if resumed else {}
             place.take_over(found.values())
             place.describe(experiment.task)
+            write_outcome(place.path, begun(place.path))
             repeater = Repeater(experiment, executor, printed(quiet), place.append, resumed=resumed)
             try:
                 repeater.up_to(experiment.repetitions(wanted), found)

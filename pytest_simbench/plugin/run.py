@@ -35,7 +35,7 @@ from pytest_simbench.records.repeatability import NAME
 from pytest_simbench.report.files import write_badge, write_files, write_outcome
 from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.markdown.github import append_summary
-from pytest_simbench.report.model.outcome import RunOutcome, looks_at
+from pytest_simbench.report.model.outcome import RunOutcome, begun, looks_at
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.terminal.progress import Progress
@@ -215,6 +215,7 @@ class Run:
         The test fails where `--sim-threshold` gives one of its metrics a value that can never fail.
         """
         self.folder.describe(task)
+        write_outcome(self.folder.path, begun(self.folder.path))
         if wrong := thresholds.bad_value(self._thresholds, task.metrics):
             pytest.fail(wrong, pytrace=False)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import fnmatch
 import json
 import re
+import signal
 
 import pytest
 
 from pytest_simbench.plugin.benchmark import shown
 from pytest_simbench.records.baseline import KEY
 from tests.cli.command import simbench
-from tests.plugin.inner import FALLING, run_pytest
+from tests.plugin.inner import CLAIMING, FALLING, run_pytest
 
 
 def run(pytester: pytest.Pytester, *more: str, **outcomes: int) -> pytest.RunResult:
@@ -37,6 +38,20 @@ def test_an_interrupted_report_is_one_sentence(pytester: pytest.Pytester) -> Non
     message = "interrupted while the report was made; the records are kept in */o, and simbench "
     assert fnmatch.filter(lines, f"Exit: {message}report */o makes the report")
     assert len((pytester.path / "o" / "records.jsonl").read_text().splitlines()) == 5
+
+
+def test_a_run_that_was_killed_has_not_passed(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        test_it=CLAIMING + "    __import__('signal').raise_signal(9)\n", test_a=CLAIMING
+    )
+    assert run(pytester).ret == -signal.SIGKILL
+    simbench(pytester, "report", "o")
+    report = pytester.path / "o" / "report.md"
+    told = "1 of 1 claims hold; the run did not end: resume it; 0 of 10 repetitions crashed"
+    assert report.read_text().startswith(f"**UNDECIDED {told}")
+    pytester.makepyfile(test_it=CLAIMING)
+    run_pytest(pytester, "--sim=mujoco --reps=5 --sim-resume=o", passed=2)
+    assert report.read_text().startswith("**PASS 2 of 2 claims hold; 0 of 10 repetitions")
 
 
 @pytest.mark.usefixtures("drawn")

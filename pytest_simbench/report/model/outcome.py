@@ -35,16 +35,20 @@ class RunOutcome:
     Attributes:
         passed: whether the tests, and the limits against the baseline, passed; None: not known.
         compared: with what, and what differs from it; None when nothing was compared.
-        looks: how often the run was gone on with and judged again, with the first time.
+        looks: how often the run was gone on with and judged again, with the first time; 0: it has
+            begun, and never was.
+        ended: whether it came to its end; one that was killed did not.
     """
 
     passed: bool | None = None
     compared: Compared | None = None
     looks: int = 1
+    ended: bool = True
 
     def to_json(self) -> str:
         """What a run folder keeps of it."""
-        found: dict[str, Any] = {"schema": SCHEMA, "passed": self.passed, "looks": self.looks}
+        known = {"passed": self.passed, "looks": self.looks, "ended": self.ended}
+        found: dict[str, Any] = {"schema": SCHEMA, **known}
         if self.compared is not None:
             baseline, report = self.compared
             found["comparison"] = {"baseline": baseline, **asdict(report)}
@@ -67,7 +71,7 @@ class RunOutcome:
             checked.schema(data, SCHEMA)
             for change in _changes(data):
                 change["loss"] = float(change["loss"])
-            whole = {"passed": data.get("passed"), "looks": data.get("looks", 1)}
+            whole = {name: data[name] for name in ("passed", "looks", "ended") if name in data}
             if comparison := data.get("comparison"):
                 whole["compared"] = comparison.pop("baseline", ""), comparison
             return checked.convert(whole, cls), ""
@@ -97,4 +101,14 @@ def looks_at(folder: Path, before: Iterable[Record], now: Iterable[Record]) -> i
     old, new = ({(r.test, r.repetition) for r in records} for records in ended)
     cut = {(r.test, r.repetition) for r in before} - old
     more = {test for test, _ in new - old} & {test for test, _ in old} - {test for test, _ in cut}
-    return RunOutcome.read(folder)[0].looks + bool(more and (folder / NAME).exists())
+    return max(1, _so_far(folder).looks + bool(more))
+
+
+def begun(folder: Path) -> RunOutcome:
+    """What the folder of a run says until it ends: a killed one says no more."""
+    return RunOutcome(looks=_so_far(folder).looks, ended=False)
+
+
+def _so_far(folder: Path) -> RunOutcome:
+    """How a run has ended before; one that is new was never looked at."""
+    return RunOutcome.read(folder)[0] if (folder / NAME).exists() else RunOutcome(looks=0)
