@@ -40,6 +40,31 @@ def test_an_interrupted_report_is_one_sentence(pytester: pytest.Pytester) -> Non
     assert len((pytester.path / "o" / "records.jsonl").read_text().splitlines()) == 5
 
 
+def test_an_interrupt_between_two_repetitions_is_no_look(pytester: pytest.Pytester) -> None:
+    """Of a test that had no verdict yet; of one that had, repetitions that are added are one."""
+    pytester.makeconftest(
+        """
+        import signal
+        from pytest_simbench.records.folder import RunFolder
+
+        append = RunFolder.append
+        def appended(self, record):
+            append(self, record)
+            if "test_it" in record.test and record.repetition == 2:
+                signal.raise_signal(signal.SIGINT)
+        RunFolder.append = appended
+        """
+    )
+    pytester.makepyfile(test_a=FALLING)
+    run(pytester, ret=pytest.ExitCode.INTERRUPTED)
+    path = pytester.path / "o" / "outcome.json"
+    run_pytest(pytester, "--sim=mujoco --reps=5 --sim-resume=o -k test_a", passed=1)
+    run_pytest(pytester, "--sim=mujoco --reps=5 --sim-resume=o", passed=2)
+    assert json.loads(path.read_text())["looks"] == 1
+    run_pytest(pytester, "--sim=mujoco --reps=6 --sim-resume=o", passed=2)
+    assert json.loads(path.read_text())["looks"] == 2
+
+
 def test_a_run_that_was_killed_has_not_passed(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(
         test_it=CLAIMING + "    __import__('signal').raise_signal(9)\n", test_a=CLAIMING
