@@ -24,7 +24,7 @@ from pytest_simbench.client.display import Displays
 from pytest_simbench.client.errors import DisplayError, ExecutorError, Unavailable, WorldParityError
 from pytest_simbench.experiment.case import PROTOCOLS
 from pytest_simbench.experiment.executor import LocalExecutor
-from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.experiment import Experiment, JitterError
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.resumed import NotResumed, Resumed, run_to_resume
 from pytest_simbench.ground.errors import SimulatorError
@@ -39,7 +39,7 @@ from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.simulator.registry import adapter, known
 from pytest_simbench.tasks.base import Task
 
-REFUSED = (SimulatorError, RecordError, DisplayError, NotResumed, ExecutorError)
+REFUSED = (SimulatorError, RecordError, DisplayError, NotResumed, ExecutorError, JitterError)
 """What becomes bad input, in its own words."""
 
 
