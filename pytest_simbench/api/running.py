@@ -24,7 +24,7 @@ from pytest_simbench.client.display import Displays
 from pytest_simbench.client.errors import DisplayError, ExecutorError, Unavailable, WorldParityError
 from pytest_simbench.experiment.case import PROTOCOLS
 from pytest_simbench.experiment.executor import LocalExecutor
-from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.experiment import Experiment, JitterError
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.resumed import NotResumed, Resumed, run_to_resume
 from pytest_simbench.ground.errors import SimulatorError
@@ -33,13 +33,13 @@ from pytest_simbench.records.paths import FolderError, new_name
 from pytest_simbench.records.record import RecordError
 from pytest_simbench.records.tuned_on import FIRST_SEED
 from pytest_simbench.report.files import write_outcome
-from pytest_simbench.report.model.outcome import RunOutcome, looks_at
+from pytest_simbench.report.model.outcome import RunOutcome, begun, looks_at
 from pytest_simbench.scene import Robot
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.simulator.registry import adapter, known
 from pytest_simbench.tasks.base import Task
 
-REFUSED = (SimulatorError, RecordError, DisplayError, NotResumed, ExecutorError)
+REFUSED = (SimulatorError, RecordError, DisplayError, NotResumed, ExecutorError, JitterError)
 """What becomes bad input, in its own words."""
 
 
@@ -112,6 +112,7 @@ def run(
             found = resumed.take(experiment, wanted) if resumed else {}
             place.take_over(found.values())
             place.describe(experiment.task)
+            write_outcome(place.path, begun(place.path))
             repeater = Repeater(experiment, executor, printed(quiet), place.append, resumed=resumed)
             try:
                 repeater.up_to(experiment.repetitions(wanted), found)

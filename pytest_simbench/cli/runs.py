@@ -90,7 +90,9 @@ def _outcome(folders: Folders, readings: dict[str, RunContents]) -> tuple[RunOut
     passed = [outcome.passed for outcome in outcomes]
     unknown = None in passed or any(reading.claims for reading in readings.values())
     together = False if False in passed else None if unknown else True
-    return RunOutcome(together, looks=max(outcome.looks for outcome in outcomes)), wrong
+    ended = all(outcome.ended for outcome in outcomes)
+    looks = max(outcome.looks for outcome in outcomes)
+    return RunOutcome(together, looks=looks, ended=ended), wrong
 
 
 def _merged(readings: dict[str, RunContents]) -> tuple[list[Merged], RunContents]:
@@ -130,7 +132,7 @@ def merge_runs(
         refused = _copy(records, folders, folder)
         unsaved = folder.flush()
         found, wrong = _outcome(folders, readings)
-        outcome = RunOutcome(found.passed, looks=found.looks)
+        outcome = replace(found, compared=None)
         problems = [*wrong, *refused, *unsaved, write_outcome(folder.path, outcome)]
         if any(reading.claims for reading in readings.values()):
             problems.append(f"pytest --sim-resume={folder.path} judges the claims of the whole")

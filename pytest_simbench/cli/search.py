@@ -15,7 +15,7 @@ from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.limits import named
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.records.metrics import CRASHED, Metric, UnknownMetric
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric, UnknownMetric
 from pytest_simbench.records.series import series
 
 
@@ -75,7 +75,7 @@ class Search:
         """What a release scored.
 
         Raises:
-            BadInput: the folder holds nothing of it, or several tests.
+            BadInput: the folder holds nothing of it, several tests, or several tasks of one.
         """
         reading = RunFolder(self.folder).read()
         rows = [
@@ -84,14 +84,17 @@ class Search:
             for row in series(r for r in reading.records if r.task == task)
             if row.key.simulator == self.named(place)
         ]
-        if len(rows) > 1:
-            names = {task: [m.name for m in known] for task, known in reading.metrics.items()}
-            rows = [r for r in rows if self.metric_name in names[r.records[0].task]]
+        every, name = (*COSTS, CRASHED), named(self.metric_name)
+        names = {task: {m.name for m in (*own, *every)} for task, own in reading.metrics.items()}
+        if len(rows) > 1 or any(name in known for known in names.values()):
+            rows = [r for r in rows if name in names[r.records[0].task]]
         if len(rows) != 1:
-            what = "no test" if not rows else "more than one test"
+            what = "more than one test" if rows else "no test"
+            how = "choose one test, with its file or with -k"
+            if len({row.records[0].test for row in rows}) == 1:
+                what, how = "more than one task of a test", "repeat each in a test of its own"
             raise BadInput(
-                f"{what} with {shown(self.metric_name)} has run on "
-                f"{self.named(place)}; choose one test, with its file or with -k"
+                f"{what} with {shown(self.metric_name)} has run on {self.named(place)}; {how}"
             )
         records = rows[0].records
         return ResultSet(records, reading.metrics[records[0].task])

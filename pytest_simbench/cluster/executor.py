@@ -70,7 +70,7 @@ class Shared:
         task, robot = experiment.task, experiment.robot
         known: dict[str, Any] = {"task_code": code_of(task)}
         if robot is not None:
-            known |= {"scene": scene_digest(task), "robot": describe_robot(robot)}
+            known |= {"scene": scene_digest(task, robot), "robot": describe_robot(robot)}
         return cls(Job.of(experiment, client).pack(), known)
 
 

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.motion.errors import RobotError
-from pytest_simbench.scene import Robot, Scene
+from pytest_simbench.scene import Robot, Scene, SceneError
 from pytest_simbench.tasks.base import ROBOT, Jitter, Task
+
+
+class JitterError(Exception):
+    """Starts that cannot be, since the jitter is too large; the message is one sentence."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +89,23 @@ class Experiment:
         if not isinstance(found, Scene):
             raise TypeError(f"scene() returns a Scene, not {type(found).__name__}")
         return found
+
+    def check_jitter(self, numbers: Iterable[int]) -> None:
+        """Complain of a jitter above the usual one with which these repetitions cannot start.
+
+        Raises:
+            JitterError: bodies of one overlap, or leave the room.
+        """
+        for seed in map(self.seed, numbers) if self.case.jitter > 1 else ():
+            try:
+                self.scene(seed)
+            except SceneError as error:
+                self.task.scene(seed, Jitter(0.0, 0.0))  # raises what is no fault of the jitter
+                raise JitterError(
+                    f"the jitter {self.case.jitter:g} is too large for the task "
+                    f"{self.task.name!r}: seed {seed}: {str(error).partition(';')[0]}; give a "
+                    "smaller one"
+                ) from None
 
     @property
     def reuses_worker(self) -> bool:

@@ -20,12 +20,13 @@ from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.ground.names import file_name
 from pytest_simbench.ground.versions import VersionedName
+from pytest_simbench.motion.registry import BUILT_IN, known_robot
 from pytest_simbench.records.configuration import text
 from pytest_simbench.records.record import Record, Status, plain
 from pytest_simbench.records.series import short
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter, address, settings_of
-from pytest_simbench.tasks.base import Jitter, Task
+from pytest_simbench.tasks.base import ROBOT, Jitter, Task
 from pytest_simbench.tasks.recorded import code_of
 
 
@@ -57,7 +58,7 @@ def record_of(
         jitter=case.jitter,
         settings={**settings, **experiment.task.parameters()},
         versions={"pytest-simbench": __version__, **versions},
-        scene=scene_digest(experiment.task),
+        scene=scene_digest(experiment.task, experiment.robot),
         task_code=code_of(experiment.task),
         robot=describe_robot(experiment.robot),
         limits=experiment.limits,
@@ -118,10 +119,11 @@ def _robot_digest(robot: Robot) -> str:
     return hashlib.sha256(data.encode()).hexdigest()[:12]
 
 
-def scene_digest(task: Task) -> str:
+def scene_digest(task: Task, chosen: Robot | None = None) -> str:
     """Twelve digits of what the task builds for one seed without jitter; empty if it builds none.
 
-    A robot's files count with their content, not their place.
+    A robot's files count with their content, not their place. One of the task's own, neither
+    `chosen` by an option nor a built-in one as it is, counts with all that it is.
     """
     try:
         try:
@@ -132,6 +134,11 @@ def scene_digest(task: Task) -> str:
             kept = {key: value for key, value in robot.items() if key != "packages"}
             told = {**kept, **{k: _content(robot[k]) for k in ("urdf", "srdf")}}
             wire = {**wire, "robot": told}
+            own = getattr(task, ROBOT, None)
+            if chosen is None and isinstance(own, Robot):
+                as_it_is = known_robot(own.name) if own.name in BUILT_IN else None
+                if describe_robot(own) != describe_robot(as_it_is):
+                    wire["own"] = describe_robot(own)
         data = json.dumps(wire, sort_keys=True, default=str)
     except Exception:  # a task may refuse this seed; then nothing is known
         return ""

@@ -56,8 +56,9 @@ class Repeater:
     def up_to(self, number: int, found: dict[int, Record]) -> list[Record]:
         """Records of all repetitions from 1 to `number`, and of what a resumed run has beyond;
         `found` holds those so far, by repetition, and takes the new ones. Raises as `run`, and
-        `NotResumed` where the versions are not those of the run."""
+        `NotResumed` where the versions are not those of the run, `JitterError`."""
         missing = [k for k in range(1, number + 1) if k not in found]
+        self.experiment.check_jitter(missing)
         if missing:
             if self.resumed is not None:
                 self.resumed.check_versions(self.experiment, self.executor)

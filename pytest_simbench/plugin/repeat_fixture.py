@@ -13,7 +13,7 @@ import pytest
 from pytest_simbench.cli.values import Auto
 from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.experiment.case import Case
-from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.experiment import Experiment, JitterError
 from pytest_simbench.experiment.identity import describe_robot, scene_digest
 from pytest_simbench.experiment.repeater import Repeater
 from pytest_simbench.experiment.resumed import NotResumed
@@ -38,7 +38,7 @@ from pytest_simbench.tasks.base import Task
 
 __tracebackhide__ = True  # a mistake in a task is told at its own line
 
-REFUSALS = (NotResumed, ExecutorError, RecordError)
+REFUSALS = (NotResumed, ExecutorError, RecordError, JitterError)
 """Errors whose sentences fail the test."""
 
 

@@ -35,7 +35,7 @@ from pytest_simbench.records.repeatability import NAME
 from pytest_simbench.report.files import write_badge, write_files, write_outcome
 from pytest_simbench.report.markdown import run as markdown
 from pytest_simbench.report.markdown.github import append_summary
-from pytest_simbench.report.model.outcome import RunOutcome, looks_at
+from pytest_simbench.report.model.outcome import RunOutcome, begun, cut_at, looks_at
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.terminal.progress import Progress
@@ -215,6 +215,7 @@ class Run:
         The test fails where `--sim-threshold` gives one of its metrics a value that can never fail.
         """
         self.folder.describe(task)
+        write_outcome(self.folder.path, begun(self.folder.path))
         if wrong := thresholds.bad_value(self._thresholds, task.metrics):
             pytest.fail(wrong, pytrace=False)
 
@@ -290,19 +291,24 @@ class Run:
             self.reading = self.folder.scan()
 
     def summarise(
-        self, reporter: pytest.TerminalReporter, comparison: Comparison | None, passed: bool
+        self,
+        reporter: pytest.TerminalReporter,
+        comparison: Comparison | None,
+        passed: bool,
+        judged: Collection[str],
     ) -> None:
         """Print the result and write the report files; the badge says whether tests and limits
-        passed."""
+        passed. Of the tests only the `judged` ones came to their end."""
         if not self.reading.records and not (self.folder.path / NAME).is_file():
             return
         path, records = self.folder.path, self.reading.records
         wanted = options.value(self.config, recording.RECORD)
         made = runs.recordings(path, path, records, self.progress) if wanted else ([], True)
         found = comparison.found if comparison else None
-        looks = looks_at(path, self.resumed.records if self.resumed else (), records)
+        before = self.resumed.records if self.resumed else ()
+        looks, cut = looks_at(path, before, records), cut_at(path, before, records, judged)
         passed = passed and not self.failing
-        outcome = RunOutcome(passed, found, looks)
+        outcome = RunOutcome(passed, found, looks, cut=cut)
         written = write_files(path, Report.of(self.reading, outcome))
         unsaved = self.folder.flush()
         problems = [*self.told, *self.reading.problems, *self.reading.refused]

@@ -3,6 +3,8 @@ is asked for."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pytest_simbench.cli.interpreters import checked_specification, interpreter_path
@@ -57,7 +59,11 @@ def parse(config: pytest.Config) -> Selection:
         for name, text in options.value(config, "sim_spec").items()
     }
     everything = registry.known() if not names or EVERY in asked else []
-    profiles, files = profiles_of(options.value(config, "sim_profile"))
+    profiles, read = profiles_of(options.value(config, "sim_profile"))
+    files = {
+        label: replace(file, path=options.path_from_root(config, file.path))
+        for label, file in read.items()
+    }
     gui, headless = options.value(config, "sim_gui"), options.value(config, "sim_headless")
     return Selection(
         tuple(dict.fromkeys([*everything, *names])),

@@ -23,7 +23,7 @@ from pytest_simbench.motion.registry import find
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Failure
 from pytest_simbench.scene.policy import LoopError
-from pytest_simbench.tasks import Stacking
+from pytest_simbench.tasks import Stacking, Throwing
 from tests.conftest import workers
 from tests.made_up import MadeUp
 from tests.tiny import Falling
@@ -139,6 +139,14 @@ def test_a_policy_that_cannot_be_asked_is_one_sentence(scripted: dict[str, Any])
     run = simbench.run(Falling(), TWO, reps=2)
     assert run.problems == ("mujoco: no such luck",)
     assert len(run.contents.every) == 4
+
+
+def test_a_jitter_that_makes_starts_overlap_is_no_crash(scripted: dict[str, Any]) -> None:
+    simbench.run(Throwing(), "mujoco", reps=4, jitter=7, folder="out")
+    told = "the jitter 10 is too large for the task 'throwing': seed 10001: scene 'throwing': "
+    with pytest.raises(simbench.BadInput, match=f"^{told}'pyramid_2' and 'pyramid_3' overlap by"):
+        simbench.run(Throwing(), "mujoco", reps=4, jitter=10, folder="none")
+    assert not RunFolder(Path("none")).holds_run
 
 
 def test_a_run_is_gone_on_with(scripted: dict[str, Any]) -> None:

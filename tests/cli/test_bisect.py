@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 
 from pytest_simbench.cli import bisect
-from pytest_simbench.cli.values import Span
+from pytest_simbench.cli.values import BadInput, Span
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.metrics import Metric
 from tests.approval import assert_approved_line
 from tests.cli.test_bisect_ends import RELEASES, Recorded
 from tests.records.build import METRICS, failed, record
@@ -40,3 +41,21 @@ def test_what_the_repetitions_show(
     told = capsys.readouterr().out
     assert_approved_line("bisect", told.replace(f"{tmp_path}", "DIR").replace("\n", " | "))
     assert status == ("the first worse release is" not in told)
+
+
+def test_a_test_with_two_tasks(tmp_path: Path) -> None:
+    """The metric says which is meant; one that both have is refused, and the other one's
+    repetitions are not taken where its own are missing."""
+    run, test = RunFolder(tmp_path), "test_both[sim==1.8-headless]"
+    run.describe(TaskDescription("stacking", METRICS))
+    run.describe(TaskDescription("other", (Metric("spilt", "spilt", better="lower"),)))
+    run.append(record(1, simulator="sim==1.8", test=test))
+    run.append(record(1, simulator="sim==1.8", test=test, task="other", metrics={"spilt": 0.5}))
+    run.append(record(1, simulator="sim==1.9", test=test.replace("8", "9")))
+    spilt = Recorded("sim", "spilt", RELEASES, tmp_path, [])
+    assert spilt.result(0).records[0].task == "other"
+    with pytest.raises(BadInput, match="no test with spilt has run on sim==1.9"):
+        spilt.result(1)
+    for name in ("crashed", "ram"):
+        with pytest.raises(BadInput, match="repeat each in a test of its own"):
+            Recorded("sim", name, RELEASES, tmp_path, []).result(0)

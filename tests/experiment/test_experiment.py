@@ -205,3 +205,13 @@ def test_a_record_says_what_it_was(case: Case) -> None:
 )  # fmt: skip
 def test_phases_that_count_on_are_told_together_and_no_others(phase: str, told: str) -> None:
     assert group(phase) == told
+
+
+def test_a_robot_of_the_task_s_own_counts_with_its_swing(case: Case) -> None:
+    """A built-in one as it is does not: records of before go on."""
+    before = scene_digest(Reaching(None))
+    other = replace(panda(), swing=None)
+    assert scene_digest(Reaching(None, robot=panda())) == before
+    assert expected(Experiment(case, Reaching(None, robot=other))).scene not in ("", before)
+    chosen = Experiment(replace(case, robot=other), Reaching(None))
+    assert expected(chosen).scene == before

@@ -42,20 +42,34 @@ def test_reaching(repeat, policy):
 """
 
 
-def test_the_command_that_runs_a_failed_one_again_names_its_file(
-    pytester: pytest.Pytester,
+@pytest.mark.parametrize("below", [".", "sub"])
+def test_the_command_that_runs_a_failed_one_again_names_its_files(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, below: str
 ) -> None:
-    claiming = TESTS.replace("    repeat(", "    assert not repeat(")
-    pytester.makepyfile(mine=MINE, test_it=claiming)
-    result = run_pytest(
-        pytester, "--sim=mujoco --reps=1 --policies=mine.py:nothing,mine.py:still", failed=2
+    claiming = TESTS.replace("    repeat(", "    assert not repeat(").replace(
+        "y):", "y, scene_file):"
     )
+    pytester.makepyfile(mine=MINE, test_it=claiming)
+    pytester.makefile(".xml", scene="<mujoco/>")
+    pytester.makefile(".toml", own="simulator = 'mujoco'")
+    pytester.makeini("[pytest]")
+    (pytester.path / "sub").mkdir()
+    monkeypatch.chdir(below)
+    up = "../" * (below != ".")
+    files = (
+        f"--sim-scene={up}scene.xml --sim-profile={up}own.toml --sim-output={up}o {up}test_it.py"
+    )
+    policies = f"{up}mine.py:nothing,{up}mine.py:still"
+    result = run_pytest(pytester, f"--sim=mujoco --reps=1 --policies={policies} {files}", failed=2)
     for name in ("nothing", "still"):
         result.stdout.fnmatch_lines([f"FAILED *test_reaching[[]mujoco-headless-{name}[]]*"])
     again = next(line for line in result.outlines if "again: pytest" in line)
-    assert "--sim-policies=mine.py:nothing,mine.py:still" in again
-    words = shlex.split(again.partition("again: pytest ")[2])
-    run_pytest(pytester, "", *words, failed=1)
+    if not up:
+        assert f"--sim-policies={policies}" in again
+    run_pytest(pytester, "", *shlex.split(again.partition("again: pytest ")[2]), failed=1)
+    told = (pytester.path / "o" / "report.md").read_text().partition("again: `pytest ")[2]
+    monkeypatch.chdir(pytester.path)
+    run_pytest(pytester, "", *shlex.split(told.partition("`")[0]), failed=1)
 
 
 def test_a_test_is_made_for_each_policy_of_its_task(pytester: pytest.Pytester) -> None:

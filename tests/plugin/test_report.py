@@ -5,13 +5,14 @@ from __future__ import annotations
 import fnmatch
 import json
 import re
+import signal
 
 import pytest
 
 from pytest_simbench.plugin.benchmark import shown
 from pytest_simbench.records.baseline import KEY
 from tests.cli.command import simbench
-from tests.plugin.inner import FALLING, run_pytest
+from tests.plugin.inner import CLAIMING, FALLING, run_pytest
 
 
 def run(pytester: pytest.Pytester, *more: str, **outcomes: int) -> pytest.RunResult:
@@ -37,6 +38,45 @@ def test_an_interrupted_report_is_one_sentence(pytester: pytest.Pytester) -> Non
     message = "interrupted while the report was made; the records are kept in */o, and simbench "
     assert fnmatch.filter(lines, f"Exit: {message}report */o makes the report")
     assert len((pytester.path / "o" / "records.jsonl").read_text().splitlines()) == 5
+
+
+def test_an_interrupt_between_two_repetitions_is_no_look(pytester: pytest.Pytester) -> None:
+    """Of a test that had no verdict yet; of one that had, repetitions that are added are one."""
+    pytester.makeconftest(
+        """
+        import signal
+        from pytest_simbench.records.folder import RunFolder
+
+        append = RunFolder.append
+        def appended(self, record):
+            append(self, record)
+            if "test_it" in record.test and record.repetition == 2:
+                signal.raise_signal(signal.SIGINT)
+        RunFolder.append = appended
+        """
+    )
+    pytester.makepyfile(test_a=FALLING)
+    run(pytester, ret=pytest.ExitCode.INTERRUPTED)
+    path = pytester.path / "o" / "outcome.json"
+    run_pytest(pytester, "--sim=mujoco --reps=5 --sim-resume=o -k test_a", passed=1)
+    run_pytest(pytester, "--sim=mujoco --reps=5 --sim-resume=o", passed=2)
+    assert json.loads(path.read_text())["looks"] == 1
+    run_pytest(pytester, "--sim=mujoco --reps=6 --sim-resume=o", passed=2)
+    assert json.loads(path.read_text())["looks"] == 2
+
+
+def test_a_run_that_was_killed_has_not_passed(pytester: pytest.Pytester) -> None:
+    pytester.makepyfile(
+        test_it=CLAIMING + "    __import__('signal').raise_signal(9)\n", test_a=CLAIMING
+    )
+    assert run(pytester).ret == -signal.SIGKILL
+    simbench(pytester, "report", "o")
+    report = pytester.path / "o" / "report.md"
+    told = "1 of 1 claims hold; the run did not end: resume it; 0 of 10 repetitions crashed"
+    assert report.read_text().startswith(f"**UNDECIDED {told}")
+    pytester.makepyfile(test_it=CLAIMING)
+    run_pytest(pytester, "--sim=mujoco --reps=5 --sim-resume=o", passed=2)
+    assert report.read_text().startswith("**PASS 2 of 2 claims hold; 0 of 10 repetitions")
 
 
 @pytest.mark.usefixtures("drawn")

@@ -158,6 +158,14 @@ def test_it_repeats_until_the_claims_are_decided(pytester: pytest.Pytester) -> N
     assert [item.get("value") for item in found] == ["10", "12", "10"]
 
 
+def test_a_jitter_that_makes_starts_overlap_is_one_sentence(pytester: pytest.Pytester) -> None:
+    task = "from pytest_simbench.tasks import Throwing as Falling"
+    pytester.makepyfile(FALLING.replace("from tests.tiny import Falling", task))
+    result = run_pytest(pytester, "--sim=mujoco --reps=4 --jitter=10 --sim-output=o", failed=1)
+    result.stdout.fnmatch_lines(["the jitter 10 is too large for the task 'throwing': seed 10001*"])
+    assert not (pytester.path / "o" / "records.jsonl").exists()
+
+
 ALIKE = """
     from tests.tiny import Falling
 

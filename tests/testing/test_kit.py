@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -55,10 +56,22 @@ def test_what_a_hand_cannot_do_is_skipped_with_the_reason() -> None:
             ConformanceTest(Subject(MuJoCo, robot=so101), CHECKS[law])()
 
 
-def test_expected_failures_of_known_robots_match() -> None:
-    conformance_checks("mujoco", expected_failures={"mujoco-tuned-ur5-static_hold": "soft"})
-    with pytest.warns(ConformanceWarning, match="matches no check"):
-        conformance_checks("mujoco", expected_failures={"mujoco-tuned-ur6-static_hold": "soft"})
+@pytest.mark.parametrize("robot", ["ur5", "of_a_file"])
+def test_expected_failures_of_other_robots_match(robot: str) -> None:
+    right = f"mujoco-tuned-{robot}-static_hold", f"*-{robot}-static_hold"
+    with warnings.catch_warnings(action="error"):
+        conformance_checks("mujoco", expected_failures=dict.fromkeys(right, "soft"))
+    for pattern in (f"mujoco-tuned-{robot}-hold", f"mujoco-tune-{robot}-static_hold"):
+        with pytest.warns(ConformanceWarning, match="matches no check"):
+            conformance_checks("mujoco", expected_failures={pattern: "soft"})
+
+
+@pytest.mark.parametrize(("pattern", "warned"), [("static_hold", 0), ("*-ur5-static_hold", 1)])
+def test_what_the_panda_fails_another_robot_may_pass(pattern: str, warned: int) -> None:
+    check = replace(CHECKS["static_hold"], law=lambda subject: None)
+    with warnings.catch_warnings(record=True) as told:
+        ConformanceTest(Subject(MuJoCo, robot=find("ur5")), check, {pattern: "soft"})()
+    assert len(told) == warned
 
 
 def test_the_robot_of_the_command_line(pytester: pytest.Pytester) -> None:

@@ -31,6 +31,8 @@ NO_CLAIM = "no claim was judged"
 
 OPEN = "the run was resumed and did not end: resume it again"
 
+INCOMPLETE = "the run did not end: resume it"
+
 ONE_SIDED = "A claim has one side, and so have its bounds: those of other tables are wider."
 
 
@@ -113,10 +115,14 @@ class _Told:
 
 
 def claims_of(
-    reading: RunContents, comparison: GateReport | None = None, passed: bool | None = None
+    reading: RunContents,
+    comparison: GateReport | None = None,
+    passed: bool | None = None,
+    ended: bool = True,
 ) -> Claims:
     """Of a run, with the limits against its baseline, and whether pytest passed it if that is
-    known: a test may be lost with its process, and one that never ran claims nothing."""
+    known: a test may be lost with its process, and one that never ran claims nothing. One that did
+    not end has not passed."""
     of_test = grouped(reading.records, lambda r: r.test)
     crashed = {test for test, of in of_test.items() if any(r.status == "failed" for r in of)}
     claims = _that_count(reading.claims, crashed)
@@ -125,7 +131,9 @@ def claims_of(
     count = Counter[str](claim.verdict for claim in claims)
     count["FAIL"] += len(failures)
     rest = passed is False and not count["FAIL"]
-    state = "FAIL" if rest else next((verdict for verdict in ORDER if count[verdict]), "")
+    why = INCOMPLETE if not ended else "tests failed or did not run" if rest else ""
+    standing = (v for v in ORDER if count[v] or (v == "UNDECIDED" and not ended))
+    state = "FAIL" if rest else next(standing, "")
     fails = [one for one in told if one.claim.verdict == "FAIL"]
     undecided = [one for one in told if one.claim.verdict == "UNDECIDED"]
     troubles = [Trouble(text) for text in failures]
@@ -135,7 +143,7 @@ def claims_of(
         found = [f"{value} ({advice})" for value, advice in of]
         troubles.append(Trouble(f"UNDECIDED {subject}: {claimed}: {'; '.join(found)}"))
     more = max(0, len(troubles) - MOST)
-    sentence = _sentence(state, count, reading.records, rest)
+    sentence = _sentence(state, count, reading.records, why)
     return Claims(state, sentence, _table(told), troubles[:MOST], more)
 
 
@@ -184,14 +192,12 @@ def _that_count(found: Sequence[Claim], crashed: Collection[str]) -> list[Claim]
     ]
 
 
-def _sentence(state: str, count: Counter[str], records: Sequence[Record], rest: bool) -> str:
+def _sentence(state: str, count: Counter[str], records: Sequence[Record], why: str) -> str:
     ended = [record for record in records if record.status != "interrupted"]
     crashed = sum(record.status == "failed" for record in ended)
     cut = len(records) - len(ended)
-    repetitions = f"{crashed} of {len(ended)} repetitions crashed" + f", {cut} cut short" * bool(
-        cut
-    )
-    repetitions = "tests failed or did not run; " * rest + repetitions
+    repetitions = f"{why}; " * bool(why) + f"{crashed} of {len(ended)} repetitions crashed"
+    repetitions += f", {cut} cut short" * bool(cut)
     total = sum(count.values())
     if not total:
         return f"{state}   {NO_CLAIM}; {repetitions}".lstrip()

@@ -6,8 +6,8 @@ The records do not say either: what a test claims is in its code, and the baseli
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Collection, Iterable
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,9 @@ Compared = tuple[str, GateReport]
 
 SCHEMA = 1
 
+KEPT = ("passed", "looks", "ended", "cut")
+"""Attributes that the file has as they are."""
+
 LARGEST = 64 * 2**20
 """[bytes]"""
 
@@ -35,16 +38,21 @@ class RunOutcome:
     Attributes:
         passed: whether the tests, and the limits against the baseline, passed; None: not known.
         compared: with what, and what differs from it; None when nothing was compared.
-        looks: how often the run was gone on with and judged again, with the first time.
+        looks: how often the run was gone on with and judged again, with the first time; 0: it has
+            begun, and never was.
+        ended: whether it came to its end; one that was killed did not.
+        cut: tests that were cut short between two repetitions, and not judged.
     """
 
     passed: bool | None = None
     compared: Compared | None = None
     looks: int = 1
+    ended: bool = True
+    cut: tuple[str, ...] = ()
 
     def to_json(self) -> str:
         """What a run folder keeps of it."""
-        found: dict[str, Any] = {"schema": SCHEMA, "passed": self.passed, "looks": self.looks}
+        found: dict[str, Any] = {"schema": SCHEMA, **{name: getattr(self, name) for name in KEPT}}
         if self.compared is not None:
             baseline, report = self.compared
             found["comparison"] = {"baseline": baseline, **asdict(report)}
@@ -67,7 +75,7 @@ class RunOutcome:
             checked.schema(data, SCHEMA)
             for change in _changes(data):
                 change["loss"] = float(change["loss"])
-            whole = {"passed": data.get("passed"), "looks": data.get("looks", 1)}
+            whole = {name: data[name] for name in KEPT if name in data}
             if comparison := data.get("comparison"):
                 whole["compared"] = comparison.pop("baseline", ""), comparison
             return checked.convert(whole, cls), ""
@@ -95,6 +103,26 @@ def looks_at(folder: Path, before: Iterable[Record], now: Iterable[Record]) -> i
     before = list(before)
     ended = ([r for r in records if r.status != "interrupted"] for records in (before, now))
     old, new = ({(r.test, r.repetition) for r in records} for records in ended)
-    cut = {(r.test, r.repetition) for r in before} - old
-    more = {test for test, _ in new - old} & {test for test, _ in old} - {test for test, _ in cut}
-    return RunOutcome.read(folder)[0].looks + bool(more and (folder / NAME).exists())
+    cut = {r.test for r in before if (r.test, r.repetition) not in old}
+    so_far = _so_far(folder)
+    more = {test for test, _ in new - old} & {test for test, _ in old} - cut - {*so_far.cut}
+    return max(1, so_far.looks + bool(more))
+
+
+def cut_at(
+    folder: Path, before: Iterable[Record], now: Iterable[Record], judged: Collection[str]
+) -> tuple[str, ...]:
+    """Tests that have repetitions, and now or before were not `judged`."""
+    known = {(r.test, r.repetition) for r in before}
+    begun = {r.test for r in now if (r.test, r.repetition) not in known}
+    return tuple(sorted({*_so_far(folder).cut, *begun}.difference(judged)))
+
+
+def begun(folder: Path) -> RunOutcome:
+    """What the folder of a run says until it ends: a killed one says no more."""
+    return replace(_so_far(folder), passed=None, compared=None, ended=False)
+
+
+def _so_far(folder: Path) -> RunOutcome:
+    """How a run has ended before; one that is new was never looked at."""
+    return RunOutcome.read(folder)[0] if (folder / NAME).exists() else RunOutcome(looks=0)

@@ -60,7 +60,7 @@ class Report:
             sweeps(reading.records, reading.metrics),
             settlings(reading.records),
             transfers(records),
-            claims_of(reading, compared[1] if compared else None, outcome.passed),
+            claims_of(reading, compared[1] if compared else None, outcome.passed, outcome.ended),
             compared,
         )
 
