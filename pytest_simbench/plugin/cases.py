@@ -76,9 +76,9 @@ def _needs(item: pytest.Item, name: str) -> tuple[str, ...]:
     fixtures = getattr(item, "fixturenames", ())
     policies = options.value(item.config, "sim_policies") if POLICY in fixtures else None
     scene = options.value(item.config, "sim_scene") if "scene_file" in fixtures else None
-    found = [(options.path_from_root(item.config, path), name) for path, name in policies or ()]
+    found = [(options.from_root(item.config, path), name) for path, name in policies or ()]
     typed = ",".join(f"{path}:{name}" if name else path for path, name in found)
-    scene = scene and options.path_from_root(item.config, scene)
+    scene = scene and options.from_root(item.config, scene)
     python = session_of(item.config).selection.pythons.get(name) if BUILD in name else None
     given = {"name": python and f"{name}={python}", "policies": typed, "scene": scene}
     return tuple(f"--sim-{option}={files}" for option, files in given.items() if files)

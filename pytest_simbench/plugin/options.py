@@ -248,7 +248,7 @@ def mentioned(config: pytest.Config, names: Sequence[str]) -> bool:
     return any(given(config, name) or _ini(config, option(name))[1] is not None for name in names)
 
 
-def path_from_root(config: pytest.Config, typed: str) -> str:
+def from_root(config: pytest.Config, typed: str) -> str:
     """A file's path for commands that are run in pytest's root folder, as the command of a report
     is: as it was typed where the run was begun there."""
     here = config.invocation_params.dir

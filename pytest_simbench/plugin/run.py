@@ -56,6 +56,7 @@ class Run:
         unwritten: whether a file, the badge among them, could not be written.
         told: sentences for the end of the run; True where one is of a file that was not written.
         expected: what later tests will ask for; set before the first one asks.
+        judged: tests that came to their end.
     """
 
     def __init__(self, config: pytest.Config) -> None:
@@ -70,6 +71,7 @@ class Run:
         self.failing = False
         self.page: Path | None = None
         self.unwritten = False
+        self.judged: set[str] = set()
         self.expected: Callable[[], Iterable[Experiment]] = tuple
         self._attempts: Counter[tuple[str, str, str]] = Counter()
         self._lock = threading.Lock()
@@ -291,14 +293,10 @@ class Run:
             self.reading = self.folder.scan()
 
     def summarise(
-        self,
-        reporter: pytest.TerminalReporter,
-        comparison: Comparison | None,
-        passed: bool,
-        judged: Collection[str],
+        self, reporter: pytest.TerminalReporter, comparison: Comparison | None, passed: bool
     ) -> None:
         """Print the result and write the report files; the badge says whether tests and limits
-        passed. Of the tests only the `judged` ones came to their end."""
+        passed."""
         if not self.reading.records and not (self.folder.path / NAME).is_file():
             return
         path, records = self.folder.path, self.reading.records
@@ -306,7 +304,7 @@ class Run:
         made = runs.recordings(path, path, records, self.progress) if wanted else ([], True)
         found = comparison.found if comparison else None
         before = self.resumed.records if self.resumed else ()
-        looks, cut = looks_at(path, before, records), cut_at(path, before, records, judged)
+        looks, cut = looks_at(path, before, records), cut_at(path, before, records, self.judged)
         passed = passed and not self.failing
         outcome = RunOutcome(passed, found, looks, cut=cut)
         written = write_files(path, Report.of(self.reading, outcome))

@@ -60,10 +60,7 @@ def parse(config: pytest.Config) -> Selection:
     }
     everything = registry.known() if not names or EVERY in asked else []
     profiles, read = profiles_of(options.value(config, "sim_profile"))
-    files = {
-        label: replace(file, path=options.path_from_root(config, file.path))
-        for label, file in read.items()
-    }
+    files = {k: replace(f, path=options.from_root(config, f.path)) for k, f in read.items()}
     gui, headless = options.value(config, "sim_gui"), options.value(config, "sim_headless")
     return Selection(
         tuple(dict.fromkeys([*everything, *names])),

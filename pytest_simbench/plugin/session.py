@@ -42,7 +42,6 @@ class SimSession:
         self.comparison: Comparison | None = None
         self._received: list[str] = []
         self._failed: list[dict[str, Any]] = []
-        self._judged: set[str] = set()
         self._passed: set[str] = set()
         self._xfailed: set[str] = set()
         self._exit_status: int = pytest.ExitCode.OK
@@ -223,8 +222,8 @@ class SimSession:
         failed = getattr(report, "simbench_failed", None)
         if failed and not self.in_worker:
             self._failed.append(failed)
-        if report.when == "call":
-            self._judged.add(report.nodeid)
+        if report.when == "call" and self.begun:
+            self.run.judged.add(report.nodeid)
         if report.when == "call" and report.passed:
             self._passed.add(report.nodeid)
         elif report.skipped and hasattr(report, "wasxfail"):
@@ -278,7 +277,7 @@ class SimSession:
             if self._exit_status == pytest.ExitCode.INTERRUPTED:
                 self.run.tell_how_to_go_on()
             passed = self._exit_status == pytest.ExitCode.OK
-            self.run.summarise(terminalreporter, self.comparison, passed, self._judged)
+            self.run.summarise(terminalreporter, self.comparison, passed)
         if self.comparison:
             terminalreporter.write_sep("=", "comparison with the baseline")
             terminalreporter.write_line(self.comparison.text(terminalreporter._tw.fullwidth))

@@ -52,7 +52,7 @@ class RunOutcome:
 
     def to_json(self) -> str:
         """What a run folder keeps of it."""
-        found: dict[str, Any] = {"schema": SCHEMA, **{name: getattr(self, name) for name in KEPT}}
+        found: dict[str, Any] = {"schema": SCHEMA} | {name: getattr(self, name) for name in KEPT}
         if self.compared is not None:
             baseline, report = self.compared
             found["comparison"] = {"baseline": baseline, **asdict(report)}
