@@ -121,13 +121,14 @@ def _robot_digest(robot: Robot) -> str:
 def scene_digest(task: Task) -> str:
     """Twelve digits of what the task builds for one seed without jitter; empty if it builds none.
 
-    A robot's files count with their content, not their place.
+    A robot's files count with their content, not their place; a scene's with what was read.
     """
     try:
         try:
             wire = _wire(task)
         except TypeError:  # a task with a list among its parameters
             wire = _wire.__wrapped__(task)
+        wire = {key: value for key, value in wire.items() if key != "file"}
         if robot := wire.get("robot"):
             kept = {key: value for key, value in robot.items() if key != "packages"}
             told = {**kept, **{k: _content(robot[k]) for k in ("urdf", "srdf")}}
