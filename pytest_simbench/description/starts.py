@@ -34,10 +34,11 @@ def read_starts(path: str | Path, scene: Scene) -> tuple[Start, ...]:
             f"{scene.name!r}; it has {', '.join(names)}"
         )
     counts = {len(array) for array in arrays.values() if array.ndim == 2 and array.shape[1] == 7}
-    if len(counts) != 1 or any(array.ndim != 2 or array.shape[1] != 7 for array in arrays.values()):
+    bad = any(array.ndim != 2 or array.shape[1] != 7 for array in arrays.values())
+    if bad or len(counts) != 1 or 0 in counts:
         raise DescriptionError(
-            f"{path} must hold an array (n, 7) for each body, of the same n: position [m] and "
-            "quaternion w, x, y, z"
+            f"{path} must hold an array (n, 7) for each body, of the same n, 1 or more: position "
+            "[m] and quaternion w, x, y, z"
         )
     for name, array in arrays.items():
         if array.dtype.kind not in "fiu" or not np.isfinite(array).all():

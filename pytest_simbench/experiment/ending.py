@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pytest_simbench.client.errors import Interrupted, Where, WorkerError
-from pytest_simbench.records.checked import short
+from pytest_simbench.records.checked import LARGEST, short
 from pytest_simbench.records.metrics import UnknownMetric
 from pytest_simbench.records.record import Failure, Record, RecordError, Status
 from pytest_simbench.tasks.base import Task
@@ -36,8 +36,9 @@ def checked(record: Record, task: Task) -> Record:
     """The record as a reader of its line has it.
 
     Raises:
-        RecordError: no reader takes it; a value is not finite, or one that its metric cannot have;
-            or it has a name that none of the task's metrics has, while one of these has no value.
+        RecordError: no reader takes it; a value is not finite, too large, or one that its metric
+            cannot have; or it has a name that none of the task's metrics has, while one of these
+            has no value.
     """
     names = {metric.name for metric in task.metrics}
     if names - record.metrics.keys() and (others := record.metrics.keys() - names):
@@ -47,9 +48,10 @@ def checked(record: Record, task: Task) -> Record:
     values = data["metrics"]
     for name, value in values.items():
         given = record.metrics[name]
-        if not isinstance(value, float | int | None) or (value is None and given is not None):
+        number = isinstance(value, float | int) and abs(value) <= LARGEST
+        if not number and (value is not None or given is not None):
             raise RecordError(
-                f"{name} of {task.name} must be a finite number or None, not {short(given)}"
+                f"{name} of {task.name} must be a number up to 1e100 or None, not {short(given)}"
             )
     for metric in task.metrics:
         value = values.get(metric.name)

@@ -122,14 +122,16 @@ def _robot_digest(robot: Robot) -> str:
 def scene_digest(task: Task, chosen: Robot | None = None) -> str:
     """Twelve digits of what the task builds for one seed without jitter; empty if it builds none.
 
-    A robot's files count with their content, not their place. One of the task's own, neither
-    `chosen` by an option nor a built-in one as it is, counts with all that it is.
+    A robot's files count with their content, not their place; a scene's with what was read. A robot
+    of the task's own, neither `chosen` by an option nor a built-in one as it is, counts with all
+    that it is.
     """
     try:
         try:
             wire = _wire(task)
         except TypeError:  # a task with a list among its parameters
             wire = _wire.__wrapped__(task)
+        wire = {key: value for key, value in wire.items() if key != "file"}
         if robot := wire.get("robot"):
             kept = {key: value for key, value in robot.items() if key != "packages"}
             told = {**kept, **{k: _content(robot[k]) for k in ("urdf", "srdf")}}

@@ -87,10 +87,13 @@ class SceneFiles:
 
     def log(self, path: str | Path, scene: Scene) -> Log:
         """The log of a file that drives of a scene follow, see `recordings.logs`."""
-        from pytest_simbench.recordings.logs import read_log
+        from pytest_simbench.recordings.logs import beyond, read_log
 
         with _ending(self.request.config):
-            return read_log(self.request.path.parent / path, scene)
+            found = read_log(self.request.path.parent / path, scene)
+        for line in beyond(found, scene):
+            self.tell(f"{path}: {line}")
+        return found
 
     def __call__(self, path: str | Path | None = None, starts: str | Path | None = None) -> Scene:
         """The scene of a file, and its account in the run folder.

@@ -26,6 +26,7 @@ from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.ground.files import FileError, read_arrays, read_file
 from pytest_simbench.recordings.bag import BagsUnavailable, check_available, frame_of
+from pytest_simbench.records.metrics import RESOLUTIONS
 from pytest_simbench.scene import FloatArray, Pose, Robot, Scene, Start, Trajectory
 from pytest_simbench.scene.checks import UNIT_TOLERANCE
 from pytest_simbench.tasks.on_scene import place
@@ -127,6 +128,20 @@ def _log(columns: Columns, scene: Scene, robot: Robot | None) -> Log:
         digest.hexdigest()[:16],
         seen | {f"{name}/pose": array for name, array in poses.items()}, told,
     )  # fmt: skip
+
+
+def beyond(log: Log, scene: Scene) -> list[str]:
+    """Of each joint that the log has outside of its range in the scene: how far it goes, a sentence
+    each. The scene starts such a joint at the end of its range, and its stops hold it there."""
+    ends, found = PreparedRobot(scene.robot).limits if scene.robot else {}, []
+    for name in log.joints:
+        (low, high), least, most = ends[name], log.seen[name].min(), log.seen[name].max()
+        if least < low - RESOLUTIONS["rad"] or most > high + RESOLUTIONS["rad"]:
+            found.append(
+                f"{name} goes from {least:.4g} to {most:.4g} rad or m, and in scene {scene.name!r} "
+                f"it stops at {low:.4g} and {high:.4g}"
+            )
+    return found
 
 
 def _numbers(name: str, array: np.ndarray) -> FloatArray:

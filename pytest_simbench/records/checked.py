@@ -19,6 +19,9 @@ DEEPEST = 32
 LARGEST_INTEGER = 10**300
 """What a float can hold; seeds may have 128 bits."""
 
+LARGEST = 1e100
+"""Of what is measured: third powers of it are finite (`measure.intervals`)."""
+
 LONGEST_NAME = 2000
 """Characters of a name: a test's id with its parameters is rarely longer than 200."""
 
@@ -27,6 +30,7 @@ Name = Annotated[str, msgspec.Meta(max_length=LONGEST_NAME)]
 Count = Annotated[int, msgspec.Meta(ge=0)]
 Positive = Annotated[int, msgspec.Meta(ge=1)]
 Size = Annotated[float, msgspec.Meta(ge=0)]
+Number = Annotated[float, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
 
 T = TypeVar("T")
 

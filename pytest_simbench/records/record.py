@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal, NamedTuple, TypedDict
 
 from pytest_simbench.records import checked
-from pytest_simbench.records.checked import Count, Name, Positive, Size
+from pytest_simbench.records.checked import Count, Name, Number, Positive, Size
 from pytest_simbench.records.metrics import COSTS, CRASHED, Metric
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.upgrade import upgraded
@@ -94,13 +94,13 @@ class Record:
     protocol: Name = "fast"
     jitter: Size = 0.0
     error: Failure | None = None
-    metrics: Mapping[str, float | bool | None] = field(default_factory=dict)
+    metrics: Mapping[str, Number | bool | None] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
     notes: Notes = field(default_factory=Notes)
     reasons: tuple[str, ...] = ()
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    stepping: Mapping[str, float] = field(default_factory=dict)
-    timeline: Mapping[str, float] = field(default_factory=dict)
+    seconds: Mapping[str, Number] = field(default_factory=dict)
+    stepping: Mapping[str, Number] = field(default_factory=dict)
+    timeline: Mapping[str, Number] = field(default_factory=dict)
     resources: Mapping[str, Any] = field(default_factory=dict)
     settings: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
@@ -224,8 +224,8 @@ class Record:
 class Use(TypedDict, total=False):
     """What `client.resources` writes, of the whole repetition and of its phases."""
 
-    cpu_percent: dict[str, float | None] | None
-    rss_mb: dict[str, float | None] | None
+    cpu_percent: dict[str, Number | None] | None
+    rss_mb: dict[str, Number | None] | None
     samples: Count | None
     phases: dict[str, Use] | None
 

@@ -95,8 +95,11 @@ def read_profile(path: str | Path) -> ProfileFile:
             convert(plain({"task": task, "first": first, "last": last}), Seen)
             for task, first, last in seeds
         )
+        if any(given.first > given.last for given in seen):
+            raise ValueError
     except (TypeError, ValueError):
-        raise SettingsError(f"{path}: seeds are lists [TASK, FIRST, LAST]") from None
+        why = "seeds are lists [TASK, FIRST, LAST], FIRST at most LAST"
+        raise SettingsError(f"{path}: {why}") from None
     found = ProfileFile(str(path), base_name(simulator), base, changes, seen)
     try:
         found.settings()

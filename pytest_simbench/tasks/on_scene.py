@@ -7,6 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -33,11 +34,14 @@ class OnScene(Task):
     world: Scene
 
     def parameters(self) -> dict[str, Any]:
-        """The scene by its digest."""
-        wire = json.dumps(self.world.to_wire(), sort_keys=True, default=float).encode()
+        """The scene by its digest, in which it does not matter where its file is."""
+        wire = self.world.to_wire()
+        if wire.pop("file", "") and (robot := wire["robot"]):  # where they are differs by machine
+            wire["robot"] = {**robot, "urdf": Path(robot["urdf"]).name}
+        data = json.dumps(wire, sort_keys=True, default=float).encode()
         return {
             "task.scene": self.world.name,
-            "task.scene_digest": digest(wire),
+            "task.scene_digest": digest(data),
             "task.starts": len(self.world.starts),
         }
 

@@ -25,6 +25,7 @@ import numpy as np
 from pytest_simbench import __version__
 from pytest_simbench.description.links import check_names
 from pytest_simbench.description.robot_files import received
+from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.parity.compare import check, misfit
 from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.parity.readback import remembering
@@ -155,7 +156,9 @@ class Server:
         world = Scene.from_wire(received(scene))
         check_names(world)
         check_supported(simulator.info, world)
-        world, inexact = combined(world, simulator.info.friction_rule)
+        prepared = PreparedRobot(world.robot).links if world.robot and world.apart else {}
+        links = [name for name, link in prepared.items() if link.shapes]
+        world, inexact = combined(world, simulator.info.friction_rule, links)
         excused = [inexact] if inexact else []
         simulator.load(world)
         self.scene = world

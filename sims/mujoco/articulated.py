@@ -218,6 +218,10 @@ class Tree:
                 reason = "it starts outside of its range, here at the nearest end"
                 tell("joint range (start)", APPROXIMATED, reason, [link.told])
             return [low, high]
+        at = int(model.jnt_qposadr[link.joint])
+        ways = np.abs(model.key_qpos[:, at] - model.qpos0[at])
+        if ways.max(initial=0.0) > widest:
+            widest = float(ways.max()) + 1.0  # no keyframe stands at a stop
         reason = f"joints without limits stop at {widest:g} rad or m to each side"
         tell("joint range (none)", APPROXIMATED, reason, [link.told])
         return [-widest, widest]

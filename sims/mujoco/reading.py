@@ -342,6 +342,11 @@ class Reading:
         at = model.jnt_qposadr[[link.joint for link in self.links]].astype(int)
         limits = np.reshape(self.tree.limits, (-1, 2))
         positions = np.clip(qpos[at] - model.qpos0[at], *limits.T).tolist()
+        began = model.qpos0[at] + positions
+        for row in np.flatnonzero(np.abs(qpos[at] - began) > CLOSE):
+            own = f"{self.links[row].told} is at {qpos[at][row]:.4g} rad or m, outside of its range"
+            where = [self.name("key", key)]
+            self.tell("key (range)", APPROXIMATED, f"{own}; here at {began[row]:.4g}", where)
         held = [drive.target(model.key_ctrl[key]) for drive in self.tree.drives]
         targets = [q if t is None else t for q, t in zip(positions, held, strict=True)]
         efforts = [drive.effort(model.key_ctrl[key]) for drive in self.tree.drives]

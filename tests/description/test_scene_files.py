@@ -176,6 +176,7 @@ def test_equal_starts_elsewhere_on_the_table_are_one(tmp_path: Path) -> None:
     [
         ({"c": rows((0, 0, 0))}, "'c', which is no free body of scene 's'; it has a, b"),
         ({"a": np.zeros((2, 3))}, r"must hold an array \(n, 7\)"),
+        ({"a": np.zeros((0, 7))}, "of the same n, 1 or more"),
         ({"a": rows((0, 0, 0)), "b": rows((0, 0, 0), (1, 0, 0))}, "of the same n"),
         ({"a": rows((0, 0, np.nan))}, "not all finite"),
         ({"a": np.zeros((1, 7))}, "quaternion of 'a' in row 0 has no unit length"),

@@ -5,8 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from pytest_simbench.description import robot_files
+from pytest_simbench.experiment.identity import scene_digest
 from pytest_simbench.experiment.scene_file import read_scene_file
 from pytest_simbench.ground.errors import DescriptionError
+from pytest_simbench.tasks import Settling
+from tests.description.test_urdf_scene import CABINET
 
 TEXT = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
 <body name="cube" pos="0 0 .5"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
@@ -42,3 +46,25 @@ def test_what_the_engine_refuses_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"zero.xml: .*mass.*line 2") as error:
         read_scene_file(path)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("ending", ["xml", "urdf"])
+def test_the_same_file_elsewhere_is_the_same_scene(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+) -> None:
+    """Also where another user keeps what was read of it."""
+    pytest.importorskip("mujoco")
+    told, text = set(), CABINET if ending == "urdf" else TEXT.replace("freejoint", "joint")
+    for folder in ("here", "there"):
+        (tmp_path / folder).mkdir()
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / folder / "cache"))
+        robot_files.folder.cache_clear()
+        path = tmp_path / folder / f"door.{ending}"
+        path.write_text(text)
+        scene = read_scene_file(path).scene
+        assert str(tmp_path / folder) in scene.arm.urdf
+        task = Settling(scene)
+        told.add((str(task.parameters()), scene_digest(task)))
+    assert len(told) == 1
+    monkeypatch.undo()
+    robot_files.folder.cache_clear()

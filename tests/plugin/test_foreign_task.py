@@ -181,7 +181,8 @@ GIVEN = """
     GIVEN = {
         "rounded": Outcome({"spill": -1e-12}), "share": Outcome({"caught": 1.5}),
         "nan": Outcome({"spill": float("nan")}), "less": Outcome({"spill": -1.0}),
-        "text": Outcome({"spill": "7"}), "nothing": None, "typo": Outcome({"cauhgt": 1.0}),
+        "text": Outcome({"spill": "7"}), "large": Outcome({"spill": 1e101}),
+        "nothing": None, "typo": Outcome({"cauhgt": 1.0}),
     }
 
     @pytest.mark.parametrize("given", GIVEN)
@@ -213,12 +214,13 @@ def test_an_outcome_that_no_record_can_hold_fails_its_test_and_no_other(
 ) -> None:
     pytester.makepyfile(test_it=GIVEN)
     result = run(pytester, "--reps=1", "--sim-output=a", ret=1)
-    result.assert_outcomes(passed=1, failed=9)  # and pytest-benchmark warns of none
+    result.assert_outcomes(passed=1, failed=10)  # and pytest-benchmark warns of none
     result.stdout.fnmatch_lines(
         ["FAIL mujoco, test_giving share: Failed: caught of pouring cannot be 1.5",
-         "FAIL mujoco, test_giving nan: *spill of pouring must be a finite number or None, not nan",
+         "FAIL mujoco, test_giving nan: *pouring must be a number up to 1e100 or None, not nan",
          "FAIL mujoco, test_giving less: *spill of pouring cannot be -1",
-         "FAIL mujoco, test_giving text: *pouring must be a finite number or None, not '7'",
+         "FAIL mujoco, test_giving text: *pouring must be a number up to 1e100 or None, not '7'",
+         "FAIL mujoco, test_giving large: *must be a number up to 1e100 or None, not 1e+101",
          "FAIL mujoco, test_giving nothing: *perform() returns an Outcome, not NoneType",
          "FAIL mujoco, test_giving typo: *no metric is named 'cauhgt' in the outcome of pouring; "
          "did you mean 'caught'? *",
@@ -226,7 +228,7 @@ def test_an_outcome_that_no_record_can_hold_fails_its_test_and_no_other(
          "FAIL mujoco, test_task Kind: *metric 'caught': kind='shares'; choose from 'share', *",
          "FAIL mujoco, test_task Raising: ValueError: a mistake of mine"]
     )  # fmt: skip
-    assert [r["metrics"] for r in records("a")] == [{"spill": 0.0}, *[{}] * 8]
+    assert [r["metrics"] for r in records("a")] == [{"spill": 0.0}, *[{}] * 9]
     told = result.stdout.str()
     assert "raise ValueError" in told
     assert "repeater.py" not in told  # nor any other line of ours before it

@@ -203,6 +203,9 @@ def test_a_log_beside_the_test_is_followed_and_a_broken_one_ends_the_run(
     (record,) = records(pytester.path / "run")
     assert record["details"]["joints"]["hinge"] == pytest.approx(0.05, abs=0.01)
     assert 0.0 < record["metrics"]["worst_hinges"] < 2.0
+    log.write_text("time,hinge\n0,7\n0.5,7\n")
+    found = run_pytest(pytester, "--sim mujoco --reps=1", passed=1)
+    found.stdout.fnmatch_lines(["*run.csv: hinge goes from 7 to 7 rad or m, and in scene 'door' *"])
     log.write_text("time,hinge\n0,0\n0.5,nan\n")
     found = run_pytest(pytester, "--sim mujoco", ret=pytest.ExitCode.USAGE_ERROR)
     found.stdout.fnmatch_lines(["*the log * has no finite number of 'hinge' in row 1*"])

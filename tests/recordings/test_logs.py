@@ -11,7 +11,7 @@ import pytest
 
 from pytest_simbench.recordings import logs
 from pytest_simbench.recordings.bag import write_bag
-from pytest_simbench.recordings.logs import read_log
+from pytest_simbench.recordings.logs import beyond, read_log
 from pytest_simbench.scene import Box, Compound, Pose, Scene
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.tasks import Log
@@ -108,6 +108,9 @@ def test_a_start_out_of_range_is_the_nearest_end_and_commands_are_as_logged(tmp_
     log = read_log(npz(tmp_path, time=TIME, slider=TIME + 1.2), SCENE)
     assert log.start.positions == (0.0, 1.0)
     assert log.trajectory.position[0, 1] == 1.2
+    (line,) = beyond(log, SCENE)
+    assert line.startswith("slider goes from 1.2 to 2.2 rad or m, and in scene")
+    assert not beyond(read_log(npz(tmp_path, time=TIME, slider=TIME), SCENE), SCENE)
     started = SCENE.at_start(log.start)
     assert started.robot.joints[1].initial_position == 1.0
 

@@ -15,7 +15,7 @@ from pytest_simbench.records.record import Failure, Record, RecordError
 from .build import record
 
 names = st.text(max_size=8)
-numbers = st.floats(allow_nan=False, allow_infinity=False)
+numbers = st.floats(-1e100, 1e100)
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | numbers | names,
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(names, inner, max_size=3),

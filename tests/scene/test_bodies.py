@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
-from itertools import product
+from itertools import combinations, product
 from typing import Any
 
 import numpy as np
@@ -358,6 +358,29 @@ def test_the_bowl_s_frictions_are_exact_by_a_mean_and_not_by_the_smaller_one() -
     assert "of cube0 and thing it is off by 0.05" in problem
     assert_approved_message(problem)
     assert of_pairs(made) == pytest.approx([1.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("rule", sorted(RULES))
+def test_pairs_that_are_kept_apart_leave_the_others_exact(rule: str) -> None:
+    own = scene("maximum", 0.05, 0.2, 0.9, 0.1, 0.3)
+    names = ["ground", *(f"body/{body.name}" for body in own.bodies)]
+    together = [(1, 2), (3, 4)]  # the ground touches nothing
+    apart = [pair for pair in combinations(range(5), 2) if pair not in together]
+    made, problem = combined(
+        replace(own, apart=tuple((names[a], names[b]) for a, b in apart)), rule
+    )
+    assert problem == ""
+    assert made.ground_friction == 0.05
+    a, b, c, d = (body.friction for body in made.bodies)
+    assert RULES[rule](np.array([a, c]), np.array([b, d])) == pytest.approx([0.9, 0.3])
+
+
+def test_what_all_links_are_kept_apart_from_does_not_touch_the_robot() -> None:
+    robot, links = replace(scenes.arm(), friction=0.9), ["one", "two"]
+    for kept, mu in ((links, 0.1), (links[:1], 0.9)):
+        apart = tuple((f"link/{link}", "ground") for link in kept)
+        own = Scene("s", robot=robot, ground_friction=0.1, apart=apart)
+        assert combined(own, "minimum", links)[0].ground_friction == mu
 
 
 def test_links_that_collide_keep_their_own_friction_or_that_they_do_not_is_told() -> None:

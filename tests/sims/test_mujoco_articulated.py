@@ -318,6 +318,22 @@ def test_a_keyframe_has_joints_and_what_their_drives_are_told(kitchen: Path) -> 
     assert start.poses[0].position == (0.0, 0.0, 0.5)
 
 
+def test_a_keyframe_outside_of_a_range_is_told_and_a_joint_without_one_has_room(
+    kitchen: Path,
+) -> None:
+    key = '</actuator><keyframe><key name="far" qpos=".3 1 -9 0 0 .5 1 0 0 0"/></keyframe>'
+    reading = changed(kitchen, "</actuator>", key)
+    (start,) = reading.scene.starts
+    assert start.positions == pytest.approx((0.25, 1.0, -9.0))
+    (line,) = (line for line in reading.account if line.quantity == "key (range)")
+    told = "slide is at 0.3 rad or m, outside of its range; here at 0.25"
+    assert (line.state, line.reason, line.where) == ("approximated", told, "far")
+    for profile in ("default", "file"):
+        simulator = loaded(MuJoCo, reading.scene.at_start(start), profile)
+        assert simulator.joint_state()[0] == pytest.approx(start.positions)
+        simulator.close()
+
+
 def test_where_the_file_counts_a_joint_from_is_kept_and_told(kitchen: Path) -> None:
     reading = changed(kitchen, 'name="slide"', 'name="slide" ref=".1"')
     assert reading.scene.arm.column("file_zero") == pytest.approx([0.1, 0.0, 0.0])

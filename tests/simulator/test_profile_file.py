@@ -76,6 +76,7 @@ def test_what_is_written_is_read_again(tmp_path: Path) -> None:
         ("[settings]", "[[settings]]", "are tables, "),
         ('["stacking", 7, 9]', "7", "seeds are lists"),
         ("7, 9", "1, inf", "seeds are lists"),
+        ("7, 9", "9, 7", "FIRST at most LAST"),
         ("7, 9", "1, 1" + "0" * 400, "seeds are lists"),
         ("timestep = 0.004", "iterations = 1" + "0" * 400, "give a whole number"),
     ],
