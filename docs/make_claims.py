@@ -65,9 +65,8 @@ def claims(what: str) -> str:
         return table(("simulator", "version", "asked on"), sorted(asked), 3)
     for name, test in CLAIMS.items():
         parts: dict[str, list[Line]] = {}
-        for line in known:
-            if line["claim"] == name:
-                parts.setdefault(line["part"], []).append(line)
+        for line in (one for one in known if one["claim"] == name):
+            parts.setdefault(line["part"], []).append(line)
         found = verdict({k: [line["verdict"] for line in of] for k, of in parts.items()})
         first = sorted(parts, key=lambda k: [n["verdict"] != "FAIL" for n in parts[k]])
         told = [_numbers(part, parts[part]) for part in first[:SHOWN]]
@@ -88,5 +87,6 @@ def _numbers(part: str, of: list[Line]) -> str:
     high = max(float(line["high"] or line["mean"]) for line in of)
     ends = f" [{low:.3g}, {high:.3g}]" if low < high else ""
     kept = sum(line["verdict"] == "PASS" for line in of)
-    share = "" if kept == len(of) else f" ({kept} of {len(of)} ways)" if kept else " (misses)"
+    none = " (misses)" if all(line["verdict"] == "FAIL" for line in of) else " (undecided)"
+    share = "" if kept == len(of) else f" ({kept} of {len(of)} ways)" if kept else none
     return f"{part} {told}{ends}{share}"

@@ -197,10 +197,12 @@ def _experiments(
 def _locked(folder: str | Path | None, resume: bool) -> RunFolder:
     """The folder of the run, this process's own; complains of one that holds another run."""
     path = Path(folder) if folder else None  # empty: the default, as on pytest's command line
-    with refusing((FolderError, NotResumed)):
+    try:
         found = run_to_resume(path, Path(RUNS)) if resume else path or new_name(Path(RUNS))
         place = RunFolder(found)
         place.lock()
+    except (FolderError, NotResumed) as error:
+        raise BadInput(str(error).replace("--sim-output", "folder")) from None
     if place.holds_run and not resume:
         place.release()
         raise BadInput(f"{found} already holds a run: give resume=True, or another folder")

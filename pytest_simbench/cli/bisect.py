@@ -23,6 +23,7 @@ from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput, Span
 from pytest_simbench.client import package_index
 from pytest_simbench.measure.bisection import between, first_worse, like_the_bad_one, steps
+from pytest_simbench.measure.comparison import MeanDifference
 from pytest_simbench.measure.speed import compared
 from pytest_simbench.simulator.registry import adapter
 
@@ -55,11 +56,11 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
             raise BadInput(f"{search.describe(place)}, so nothing tells worse")
     found, _ = compared(metric, good, bad)
     if not (found.significant() and metric.differs(found.first, found.second)):
-        tiny = "by less than means anything" if found.significant() else f"p = {found.p_value:.2g}"
+        tiny = "by less than means anything" if found.significant() else _sure(found)
+        more = "" if found.sole else "; try more of them, --reps 40 for instance"
         print(
             f"{search.describe(0)}, {search.describe(last)}: these repetitions do not show that it "
-            f"is worse ({tiny}), so there is nothing to find; try more of them, "
-            "--reps 40 for instance"
+            f"is worse ({tiny}), so there is nothing to find{more}"
         )
         return 1
 
@@ -75,7 +76,7 @@ def bisect(wanted: Span, metric_name: str, folder: Path, arguments: Sequence[str
     if all(side.values(metric) for side in sides):
         step, _ = compared(metric, *sides)
         apart = "" if step.significant() else ", which does not tell the two apart"
-        sure = f" (p = {step.p_value:.2g}{apart})"
+        sure = f" ({_sure(step)}{apart})"
     print(
         f"the first worse release is {releases[place]}: {search.describe(place - 1)}, "
         f"{search.describe(place)}{sure}"
@@ -96,6 +97,10 @@ def start(span: Span, metric: str, arguments: Sequence[str]) -> int:
     releases = f"{span.name}:{span.good}..{span.bad}"
     own = [sys.modules[__name__]]  # tells the plugin who asks
     return int(pytest.main([*arguments, "--sim-bisect", releases, metric], plugins=own))
+
+
+def _sure(found: MeanDifference) -> str:
+    return "every repetition is the same" if found.sole else f"p = {found.p_value:.2g}"
 
 
 def _releases(wanted: Span) -> list[str]:

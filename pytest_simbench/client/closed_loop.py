@@ -156,6 +156,7 @@ class ClosedLoop:
     Args:
         timestep: of the simulator [s].
         seconds: of simulated time at most.
+        log_period: between samples of the answer's log [s]; None: no log.
 
     Attributes:
         observation: the newest that the policy may see.
@@ -177,6 +178,7 @@ class ClosedLoop:
         kinematics: Kinematics,
         looking: Looking | None = None,
         goal: Pose | None = None,
+        log_period: float | None = None,
     ) -> None:
         every, late, self._old = rhythm.steps(timestep)
         self._sight = Sight(scene, kinematics, goal)
@@ -185,7 +187,7 @@ class ClosedLoop:
         self._seen: list[Observation] = []
         self._questions = process.converse(
             "close_loop", every=every, most=max(1, round(seconds * rhythm.rate)), late=late,
-            log_period=None, forces=looking.forces, picture=looking.picture, inside=None,
+            log_period=log_period, forces=looking.forces, picture=looking.picture, inside=None,
         )  # fmt: skip
         first = next(self._questions)
         self._see(first)
@@ -255,6 +257,7 @@ class Episode:
         at_most: seconds that the loop lasts if that never holds.
         looking: what the policy is shown beside the state.
         inside: whether it runs in the worker.
+        log_period: between samples of its trace [s]; None: there is none.
     """
 
     policy: Any
@@ -265,6 +268,7 @@ class Episode:
     looking: Looking
     inside: bool
     goal: Pose | None
+    log_period: float | None
 
     @property
     def seconds(self) -> float:
@@ -276,9 +280,7 @@ class Episode:
         seconds = self.at_most if callable(self.until) else self.until
         return checked(seconds, "the seconds of a closed loop", above=True)
 
-    def inner(
-        self, process: WorkerProcess, scene: Scene, timestep: float, log_period: float | None
-    ) -> Mapping[str, Any]:
+    def inner(self, process: WorkerProcess, scene: Scene, timestep: float) -> Mapping[str, Any]:
         """Carry it out inside the worker; its answer."""
         Sight(scene)  # there is a robot
         every, late, old = self.rhythm.steps(timestep)
@@ -288,8 +290,9 @@ class Episode:
         most = max(1, round(self.seconds * self.rhythm.rate))
         try:
             answer: Mapping[str, Any] = process.request(
-                "close_loop", every=every, most=most, late=late, log_period=log_period,
-                forces=False, picture=None, inside=shipped(self.policy, self.seed, self.goal),
+                "close_loop", every=every, most=most, late=late, forces=False, picture=None,
+                log_period=self.log_period or 1 / self.rhythm.rate,
+                inside=shipped(self.policy, self.seed, self.goal),
             )  # fmt: skip
         except WorkerHung as error:
             told = f"the policy {name_of(self.policy)}, which ran inside it, may be what stalls"
@@ -317,6 +320,7 @@ class Episode:
             loop = ClosedLoop(
                 process, scene, self.rhythm, timestep=timestep, seconds=self.seconds,
                 kinematics=kinematics, looking=self.looking, goal=self.goal,
+                log_period=self.log_period,
             )  # fmt: skip
             try:
                 going = True

@@ -249,23 +249,24 @@ class World:
             Looking(forces, picture),
             inside,
             goal,
+            self._trace_period,
         )
+        states: list[Observation] = []
         if inside:
-            period = self._trace_period or 1 / episode.rhythm.rate
             try:
-                answer = episode.inner(self.process, self.scene, self._timestep, period)
+                answer = episode.inner(self.process, self.scene, self._timestep)
             except PolicyError as error:
                 raise PolicyFailed(str(error), self.process.where) from error
-            motion = Motion(**answer["log"]) if answer["log"] else self._still()
         else:
             answer, states, seconds = episode.outer(
                 self.process, self.scene, self._timestep, self._model()
             )
             self.stopwatch.add("policy", seconds)
-            motion = Motion.of(states) if states else self._still()
+        logged = Motion(**answer["log"]) if answer["log"] else self._still()
+        motion = Motion.of(states) if states else logged
         self._leave_out(answer.get("aside", 0.0))
         if self._trace_period is not None and len(motion):
-            self.trace.append(self._thinned(motion))
+            self.trace.append(self._thinned(max(motion, logged, key=len)))
         self._take(answer)
         return motion
 

@@ -189,7 +189,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "robots": ({"robot": "all"}, "robot=all: give one of "),
     "resume": ({"resume": True}, "there is no run to resume in .simbench"),
     "resumed": ({"resume": True, "folder": "."}, "it has no records.jsonl"),
-    "file": ({"folder": "file"}, "file"),
+    "file": ({"folder": "file"}, "(file is a file); give another folder"),
     "taken": ({"folder": "taken"}, "taken already holds a run: give resume=True, or another"),
 }
 

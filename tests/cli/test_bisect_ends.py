@@ -20,7 +20,7 @@ class Recorded(Search):
     """A search in a folder that holds all runs."""
 
     def run(self, *places: int) -> None:
-        pass
+        self.ran.update({f"test_stacking[{self.named(place)}-headless]": "" for place in places})
 
 
 def search(folder: Path, *ends: float, moved: float | None = None) -> Search:

@@ -36,11 +36,11 @@ Worlds = Callable[..., World]
 def world(case: Case) -> Iterator[Worlds]:
     processes = []
 
-    def made(scene: Scene = SCENE, **limits: Any) -> World:
+    def made(scene: Scene = SCENE, period: float | None = None, **limits: Any) -> World:
         launch = replace(case, **limits).launch(f"x{len(processes)}")
         processes.append(WorkerProcess(launch, Where(case.simulator, case.mode, 1, 7)))
         processes[-1].construct()
-        return World(processes[-1], scene, kinematics=Servo)
+        return World(processes[-1], scene, kinematics=Servo, trace_period=period)
 
     yield made
     for process in processes:
@@ -63,6 +63,15 @@ def test_inside_the_worker_by_message_or_by_socket_it_is_the_same_to_the_last_bi
     ends.append((far.time, far.joints.tobytes(), far.bodies.tobytes()))
     assert len(set(ends)) == 1
     assert abs(far.joints[0, 3] - panda().joints[3].initial_position) > 0.05
+
+
+@pytest.mark.parametrize(("rate", "samples"), [(10, 25), (50, 25), (100, 25)])
+def test_a_trace_is_as_dense_whatever_the_rate(world: Worlds, rate: int, samples: int) -> None:
+    """The motion has the states at each look."""
+    one = world(period=0.02)
+    motion = one.control(still, until=0.5, rate=rate)
+    assert len(motion) == rate // 2
+    assert len(one.trace[0]) == samples
 
 
 def seen_by(world: World, **options: Any) -> list[Observation]:

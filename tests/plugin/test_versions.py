@@ -11,7 +11,7 @@ import pytest
 from pytest_simbench.plugin.selection import select
 from tests.cli.command import simbench
 from tests.cluster.machines import release_in
-from tests.plugin.inner import records, run_pytest, usage_error, wrapper
+from tests.plugin.inner import FALLING, records, run_pytest, usage_error, wrapper
 from tests.plugin.planted import plant
 
 
@@ -109,6 +109,24 @@ def test_history_bisection_and_gate(pytester: pytest.Pytester) -> None:
          '  versions.planted-engine was "1.2", is "1.3"',
          "FAILED *[[]planted==1.3-headless[]]: landed fell from 100 % to 0 %"]
     )  # fmt: skip
+
+
+@pytest.mark.usefixtures("planted")
+def test_a_bisection_tells_of_the_test_that_ran_now(pytester: pytest.Pytester) -> None:
+    other = f"{FALLING}def test_other(repeat):\n    repeat(Falling(0.5))\n"
+    good = "1.2 landed 100 %, 1.3 landed 0 %: *"
+    for code, metric, told in (
+        (FALLING, "landed", good),
+        (other, "landed", good),  # which lies beside the first
+        (other, "cpu_cost", "1.2 cpu_cost *, 1.3 cpu_cost *"),
+        (other.replace("0.5", "0.4"), "landed", "*duration was 0.5, is 0.4; remove *"),
+        (other.replace("(Falling(0", "(fall(0"), "landed", "*run on planted==1.2 (NameError: *"),
+    ):
+        pytester.makepyfile(test_planted=code)
+        words = ("planted:1.2..1.3", metric, "--reps=2", "test_planted.py")
+        chosen = ("-k", "other") if code != FALLING else ()
+        result = simbench(pytester, "bisect", *words, *chosen)
+        (result.stdout if told[0] == "1" else result.stderr).fnmatch_lines([told])
 
 
 @pytest.mark.usefixtures("planted")

@@ -45,3 +45,14 @@ def test_the_page_says_what_the_numbers_say() -> None:
 def test_a_verdict_on_a_claim(one: list[str], other: list[str], found: str) -> None:
     assert verdict({"one": one, "other": other}) == found
     assert verdict({}) == "cannot be decided"
+
+
+def test_a_number_that_nobody_can_judge_is_not_told_as_missed() -> None:
+    def told(*verdicts: str) -> str:
+        line = {"mean": "0.2", "low": "0.1", "high": "0.9"}
+        return make_claims._numbers("cost", [{**line, "verdict": found} for found in verdicts])
+
+    assert told("UNDECIDED", "UNDECIDED") == "cost 0.2 [0.1, 0.9] (undecided)"
+    assert told("UNDECIDED", "FAIL") == "cost 0.2 [0.1, 0.9] (undecided)"
+    assert told("FAIL", "FAIL") == "cost 0.2 [0.1, 0.9] (misses)"
+    assert told("PASS", "UNDECIDED") == "cost 0.2 [0.1, 0.9] (1 of 2 ways)"

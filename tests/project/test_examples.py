@@ -11,6 +11,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pytest_simbench.measure.limits import parse_limits
+from pytest_simbench.tasks import Stacking, Throwing
+
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
@@ -98,6 +101,9 @@ def test_build_workflow(pytester: pytest.Pytester) -> None:
     pytester.makepyfile(test_kit=textwrap.dedent(kit).replace("build/bin/python", sys.executable))
     commands = re.findall(r"pytest (--pyargs (?:.|\n +)*?)(?=\n +- )", text)
     assert len(commands) == 3
+    typed = re.findall(r'--sim-compare-fail="(.*)"', text)[0]
+    metrics = [metric for task in (Stacking(), Throwing()) for metric in task.metrics]
+    assert len(parse_limits(typed, metrics)) == 3
     line = " ".join(commands).replace('"', "").replace("build/bin/python", sys.executable)
     line = line.replace("=mujoco==4.0.0,", f"=mujoco@last={sys.executable},")  # not installed here
     words = line.replace("mujoco==4.0.0", "mujoco@last").split()
