@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -48,16 +49,17 @@ def test_what_the_repetitions_show(
 def test_a_test_with_two_tasks(tmp_path: Path) -> None:
     """The metric says which is meant; one that both have is refused, and the other one's
     repetitions are not taken where its own are missing."""
-    run, test = RunFolder(tmp_path), "test_both[sim==1.8-headless]"
+    run, test = RunFolder(tmp_path), "test_stacking[sim==1.8-headless]"
     run.describe(TaskDescription("stacking", METRICS))
     run.describe(TaskDescription("other", (Metric("spilt", "spilt", better="lower"),)))
     run.append(record(1, simulator="sim==1.8", test=test))
     run.append(record(1, simulator="sim==1.8", test=test, task="other", metrics={"spilt": 0.5}))
     run.append(record(1, simulator="sim==1.9", test=test.replace("8", "9")))
     spilt = Recorded("sim", "spilt", RELEASES, tmp_path, [])
+    spilt.run(0, 1)
     assert spilt.result(0).records[0].task == "other"
     with pytest.raises(BadInput, match="no test with spilt has run on sim==1.9"):
         spilt.result(1)
     for name in ("crashed", "ram"):
         with pytest.raises(BadInput, match="repeat each in a test of its own"):
-            Recorded("sim", name, RELEASES, tmp_path, []).result(0)
+            replace(spilt, metric_name=name).result(0)
