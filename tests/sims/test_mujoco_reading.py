@@ -160,6 +160,14 @@ def test_the_profile_file_needs_a_file(scene: Scene) -> None:
         loaded(MuJoCo, scene, "file")
 
 
+def test_more_shapes_than_can_be_held_against_each_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pytest_simbench.sims.mujoco.reading.MOST_SHAPES", 2)
+    with pytest.raises(DescriptionError, match=r".xml: \d+ shapes collide, and 2 can; leave out"):
+        read(tmp_path)
+
+
 REFUSED = {
     "no shape that collides: box": ('name="g"', 'contype="0" conaffinity="0"'),
     "is not level": ('type="plane"', 'type="plane" euler="10 0 0"'),
