@@ -224,6 +224,13 @@ def test_what_is_not_carried_is_told(tmp_path: Path, quantity: str, text: str) -
     assert quantity in told - before
 
 
+def test_what_a_file_switches_off_is_told_by_name(tmp_path: Path) -> None:
+    flags = '<option><flag gravity="disable" spring="disable" limit="disable"/></option>'
+    text = SMALL.replace("<worldbody>", f"{flags}<worldbody>")
+    (told,) = (line for line in read(tmp_path, text).account if line.quantity.endswith("leflags"))
+    assert told.reason.endswith("all else acts; in the file: limit spring gravity")
+
+
 EXCLUDED = "</worldbody><contact><exclude body1='box' body2='ball'/></contact>"
 ALONE = [(name, "box") for name in ("post", "ball", "rock", "tool", "ground")]
 
