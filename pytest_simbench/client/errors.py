@@ -85,7 +85,8 @@ class Diverged(WorkerError):
 
 
 class Unavailable(WorkerError):
-    """This machine lacks what was asked for, a driver for instance; such a test is skipped."""
+    """This machine lacks what was asked for, a driver for instance, or the simulator cannot hold
+    the scene; such a test is skipped."""
 
 
 class NodeLost(WorkerError):
@@ -128,6 +129,9 @@ REMOTE_ERRORS: dict[str, type[WorkerError]] = {
     "SystemExit": WorkerExited,
 }
 """Worker-side error names and what they become here; all others are `EngineFailed`."""
+
+BEFORE_STEPPING = ("compiling", "load")
+"""Phases in which a `NotSupportedError` is `Unavailable`: nothing was simulated."""
 
 
 def exit_text(code: int | None) -> str:

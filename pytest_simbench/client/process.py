@@ -21,12 +21,14 @@ from pytest_simbench.client import bootstrap, reaper
 from pytest_simbench.client.answers import Constructed, Frame, checked
 from pytest_simbench.client.connection import Connection, RemoteError, elsewhere
 from pytest_simbench.client.errors import (
+    BEFORE_STEPPING,
     REMOTE_ERRORS,
     EngineFailed,
     Interrupted,
     OutOfMemory,
     ProtocolError,
     RepetitionTimeout,
+    Unavailable,
     Where,
     WorkerError,
     WorkerExited,
@@ -301,6 +303,8 @@ class WorkerProcess:
 
     def _remote_error(self, error: dict[str, str]) -> WorkerError:
         kind = REMOTE_ERRORS.get(error["type"], EngineFailed)
+        if error["type"] == "NotSupportedError" and self.where.phase in BEFORE_STEPPING:
+            kind = Unavailable
         found = kind(error["message"], self.where, self.launch.log_tail())
         if isinstance(found, EngineFailed):
             found.remote = error["type"]

@@ -41,7 +41,7 @@ def check_mjcf(path: str, room: Path | None = None, above: tuple[Path, ...] = ()
     elements = _included(main, root, room, (), lines)
     folders: dict[str, str] = {}
     count = dict.fromkeys(MOST, 0)
-    for element in elements:
+    for element, times in elements.items():
         if element.tag == "compiler":
             assets = element.get("assetdir")
             for folder in ("meshdir", "texturedir"):
@@ -49,11 +49,11 @@ def check_mjcf(path: str, room: Path | None = None, above: tuple[Path, ...] = ()
                 if told is not None:
                     folders[folder] = told
         if element.tag in count:
-            count[element.tag] += 1
+            count[element.tag] += times
             if count[element.tag] > MOST[element.tag]:
                 raise DescriptionError(
-                    f"{path} has more than {MOST[element.tag]} elements <{element.tag}>; read a "
-                    "smaller scene"
+                    f"{path} has more than {MOST[element.tag]} elements <{element.tag}>, with "
+                    "those that <replicate> makes; read a smaller scene"
                 )
     for element in elements:
         folder = folders.get(FOLDERS.get(element.tag, ""), "")
@@ -80,8 +80,10 @@ def _included(
     room: Path,
     above: tuple[Path, ...],
     lines: dict[ET.Element, tuple[Path, int]],
-) -> list[ET.Element]:
-    """All elements of a file and of those that it includes, in order."""
+    times: int = 1,
+) -> dict[ET.Element, int]:
+    """All elements of a file and of those that it includes, in order, and how often each is there
+    where the file is `times`: <replicate> repeats what it holds."""
     own: dict[ET.Element, int] = {}
     xml = read_xml(str(path), "the scene", own)
     if xml.tag == "robot":
@@ -89,10 +91,14 @@ def _included(
             f"{path} is a URDF, no MJCF; call it .urdf, or give a robot as --robot"
         )
     lines.update({element: (path, line) for element, line in own.items()})
-    found: list[ET.Element] = []
+    found: dict[ET.Element, int] = {}
+    often = {xml: times}
     for element in xml.iter():
+        count = element.get("count", "") if element.tag == "replicate" else ""
+        inside = often[element] * (int(count[:9]) if count.isdecimal() else 1)
+        often.update(dict.fromkeys(element, inside))
         if element.tag != "include":
-            found.append(element)
+            found[element] = often[element]
             continue
         other = _inside(element.get("file", ""), root, room, lines[element])
         if other in (*above, path.resolve()):
@@ -101,7 +107,7 @@ def _included(
             )
         if len(lines) > 5 * MOST["geom"]:
             raise DescriptionError(f"{path}, line {own[element]}: too much is included")
-        found += _included(other, root, room, (*above, path.resolve()), lines)
+        found |= _included(other, root, room, (*above, path.resolve()), lines, often[element])
     return found
 
 

@@ -46,10 +46,13 @@ class Description:
         joints: elements, in the order of the file.
         root: name of the link on which all others hang.
         meshes: absolute path of each mesh, by the name that the file gives it.
+        shapes: that a link may collide with, in words.
 
     Raises:
         DescriptionError: the file is not there, or something in it cannot be; says what.
     """
+
+    shapes = "box or mesh"
 
     def __init__(
         self,
@@ -189,7 +192,7 @@ class Description:
         if len(shapes) != 1 or shapes[0].tag not in ("box", "mesh"):
             told = ", ".join(f"<{shape.tag}>" for shape in shapes) or "nothing"
             self.refuse(
-                link, f"has a collision shape of {told}; it must be one box or one mesh", geometry
+                link, f"has a collision shape of {told}; it must be one {self.shapes}", geometry
             )
         (shape,) = shapes
         if shape.tag == "box":

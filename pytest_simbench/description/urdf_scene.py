@@ -12,7 +12,7 @@ import numpy as np
 
 from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRIED, Carried, named
 from pytest_simbench.description.links import link_poses
-from pytest_simbench.description.mesh_check import PACKAGE, written_stl
+from pytest_simbench.description.mesh_check import FARTHEST, PACKAGE, written_stl
 from pytest_simbench.description.robot_files import content, keep, keep_mesh
 from pytest_simbench.description.shapes import capsule_hull, cylinder_hull, own_points
 from pytest_simbench.description.urdf import PreparedRobot
@@ -58,6 +58,8 @@ def read_urdf_scene(path: Path) -> tuple[Scene, tuple[Carried, ...]]:
 class _World(Description):
     """A URDF whose joints may turn without end, and whose shapes may be round."""
 
+    shapes = "box, sphere, cylinder or mesh"
+
     def __init__(self, path: Path) -> None:
         self.account: list[Carried] = []
         self._endless: list[str] = []
@@ -72,8 +74,9 @@ class _World(Description):
             radius, length = (
                 self.number(link, shape, key) for key in ("radius", "length" if long else "radius")
             )
-            if min(radius, length) <= 0:
-                self.refuse(link, f"has a {shape.tag} whose size is not above 0", shape)
+            if min(radius, length) <= 0 or max(radius, length / 2) > FARTHEST:
+                told = f"has a {shape.tag} whose size is not above 0, or not up to {FARTHEST:g} m"
+                self.refuse(link, told, shape)
             kept, gap = _round(radius, length / 2 if long else 0.0)
             geometry.remove(shape)
             ET.SubElement(geometry, "mesh", filename=kept)

@@ -72,7 +72,7 @@ def pytest_cmdline_main(config: pytest.Config) -> int | None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_setup() -> Generator[None, Any, Any]:
-    """A test that asks for what this machine lacks is skipped, with the reason."""
+    """A test that asks for what machine or simulator lacks is skipped, with the reason."""
     try:
         return (yield)
     except Exception as error:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.cli.values import Auto
-from pytest_simbench.client.errors import ExecutorError
+from pytest_simbench.client.errors import ExecutorError, Unavailable
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment, JitterError
 from pytest_simbench.experiment.identity import describe_robot, scene_digest
@@ -33,6 +33,7 @@ from pytest_simbench.records.configuration import task_parameters, text
 from pytest_simbench.records.description import TaskDescription, by_task
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record, RecordError, plain
+from pytest_simbench.records.series import short
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks.base import Task
 
@@ -83,8 +84,12 @@ class RepeatFixture:
         )
 
         def up_to(number: int) -> list[Record]:
-            with failing((*REFUSALS, LoopError)):
-                return repeater.up_to(number, found)
+            try:
+                with failing((*REFUSALS, LoopError)):
+                    return repeater.up_to(number, found)
+            except Unavailable as error:
+                run.tell(f"{short(self.case.test)} was skipped: {error.what}")
+                raise
 
         metrics = experiment.task.metrics
         auto = isinstance(wanted, Auto)

@@ -23,12 +23,20 @@ class FolderLock:
     that is not there is made. Several processes of one run (xdist's workers) are `shared`.
 
     Raises:
-        FolderError: it cannot be written to, or another run is under way in it.
+        FolderError: it cannot be written to, another run is under way in it, or its path is no
+            UTF-8, in which workers are told where they run.
     """
 
     def __init__(self, folder: Path, *, shared: bool = False) -> None:
         self.folder = folder
         self._lock: int | None = None
+        try:
+            str(folder.absolute()).encode()
+        except UnicodeEncodeError:
+            raise FolderError(
+                f"the path of the run folder {str(folder.absolute())!r} is no UTF-8, and workers "
+                "cannot run there; give another folder"
+            ) from None
         self._made = [path for path in (folder, *folder.parents) if not os.path.lexists(path)]
         try:
             folder.mkdir(parents=True, exist_ok=True)

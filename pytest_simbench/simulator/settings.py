@@ -23,6 +23,9 @@ S = TypeVar("S", bound="Settings")
 SHORTEST_TIMESTEP = 1e-6
 """[s]. A run of more steps would not end in a day."""
 
+TOO_MANY = 2**31
+"""Engines hold whole numbers in 32 bits."""
+
 LARGEST_TIMESTEP = 1 / 60
 """[s]. At the 3 m/s that the arm reaches, a cube of 5 cm then moves by its own width in a step, and
 with longer steps one may pass through another unseen. No engine has a longer default, and no motion
@@ -64,8 +67,9 @@ def changed(settings: S, changes: Mapping[str, Any], simulator: str) -> S:
     """The settings with single values changed; texts are converted to each field's type.
 
     Raises:
-        SettingsError: an unknown name, a value its field cannot take, or a time step too coarse for
-            the tasks; lists the valid ones.
+        SettingsError: an unknown name, a value its field cannot take, one that makes no sense of
+            what is searched (`Linear.problem`), or a time step too coarse for the tasks; lists the
+            valid ones.
     """
     hints = get_type_hints(type(settings))
     for name in changes:
@@ -85,6 +89,19 @@ def changed(settings: S, changes: Mapping[str, Any], simulator: str) -> S:
             f"{SHORTEST_TIMESTEP:g} to {LARGEST_TIMESTEP:.4g}, in which a thrown cube moves by its "
             "own width"
         )
+    for one in searched(type(settings)):
+        value, default = values.get(one.setting), getattr(type(settings), one.setting, None)
+        if not isinstance(one.over, Linear) or value in (None, default):
+            continue
+        value = value if one.part is None else value[one.part]
+        wanted = one.over.problem(value)
+        if one.whole and value >= TOO_MANY:
+            wanted = f"a number below {TOO_MANY}"
+        if wanted:
+            raise SettingsError(
+                f"{simulator}.{one.name}={value:g}: give {wanted}, "
+                f"{one.over.low:g} to {one.over.high:g} for instance"
+            )
     return result
 
 
@@ -146,7 +163,7 @@ When = tuple[Any, ...]
 
 @dataclass(frozen=True)
 class Linear:
-    """Numbers from `low` to `high`, both included."""
+    """Numbers from `low` to `high`, both included: those that a search tries. More can be set."""
 
     low: float
     high: float
@@ -155,9 +172,23 @@ class Linear:
     def __str__(self) -> str:
         return f"{self.low:g} to {self.high:g}"
 
+    def problem(self, value: float) -> str:
+        """What to give instead of a number that cannot be meant; empty where it can."""
+        return "a number from 0 on" if value < 0 <= self.low else ""
+
+
+class Share(Linear):
+    """The same of what is between 0 and 1."""
+
+    def problem(self, value: float) -> str:
+        return "" if 0 <= value <= 1 else "a number from 0 to 1"
+
 
 class Log(Linear):
     """The same on a logarithmic scale."""
+
+    def problem(self, value: float) -> str:
+        return "" if value > 0 else "a number above 0"
 
     def __str__(self) -> str:
         return f"{super().__str__()} log"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
-from pytest_simbench.simulator.settings import EACH, Linear, Log
+from pytest_simbench.simulator.settings import EACH, Linear, Log, Share
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class GenesisSettings(Settings):
     friction_cone: Annotated[Literal["pyramidal", "elliptic"], EACH] = "pyramidal"
     impratio: Annotated[float, Log(1, 100)] = 0.0
     constraint_timeconst: Annotated[float, Log(0.002, 0.05)] = 0.01
-    impedance: tuple[Annotated[float, Linear(0.5, 0.99)], Annotated[float, Linear(0.9, 0.9999)]] = (
+    impedance: tuple[Annotated[float, Share(0.5, 0.99)], Annotated[float, Share(0.9, 0.9999)]] = (
         0.9,
         0.95,
     )

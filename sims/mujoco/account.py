@@ -30,7 +30,7 @@ OPTIONS = {
     "viscosity": AIR,
     "wind": AIR,
     "magnetic": "nothing in a scene is magnetic",
-    "disableflags": "only gravity that is switched off is carried",
+    "disableflags": "gravity, contact and filterparent alone are carried; all else acts",
     "enableflags": "a switch of MuJoCo's own",
 }
 
@@ -196,7 +196,8 @@ def _tell_options(reading: Reading) -> None:
         value = np.array([getattr(option, name)])
         if not np.array_equal(value, [getattr(plain, name)]):
             reason = OPTIONS.get(name, "each engine has the options of its profile")
-            reason = f"{reason}; in the file: {values_of(value)}"
+            off = switched_off(option.disableflags) if name == "disableflags" else values_of(value)
+            reason = f"{reason}; in the file: {off}"
             reading.tell(f"option {name}", NOT_CARRIED, reason)
 
 
@@ -246,6 +247,16 @@ def _tell_objects(reading: Reading) -> None:
         left = list(range(getattr(model, count, 0)))
         if left:
             reading.tell(kind, NOT_CARRIED, reason, [reading.name(kind, k) for k in left])
+
+
+def switched_off(flags: int) -> str:
+    """What these flags of a model switch off, by the names of a file."""
+    names = [
+        name.removeprefix("mjDSBL_").lower()
+        for name, bit in mujoco.mjtDisableBit.__members__.items()
+        if bit & flags and name.startswith("mjDSBL_")
+    ]
+    return " ".join(names) or "none"
 
 
 def values_of(values: FloatArray) -> str:

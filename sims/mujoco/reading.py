@@ -31,6 +31,9 @@ mujoco = lazy_import("mujoco")
 CLOSE = 1e-6
 """Share by which a body's centre and moments may be off those of its one shape."""
 
+MOST_SHAPES = 5000
+"""Of a scene that collide: each is held against each, which takes half a minute and 1 GB."""
+
 
 @dataclass(frozen=True)
 class Placed:
@@ -77,6 +80,9 @@ class Reading:
         self.falls = bool(model.opt.gravity.any() and not off)
         masks = model.geom_contype | model.geom_conaffinity
         self.solid = np.flatnonzero(masks).tolist()
+        if len(self.solid) > MOST_SHAPES:
+            told = f"{len(self.solid)} shapes collide, and {MOST_SHAPES} can; leave out some"
+            raise self.refuse(told)
         self.ground = self._find_ground()
         self.links = on_joints(self)
         try:

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
-from pytest_simbench.simulator.settings import EACH, Linear, Log
+from pytest_simbench.simulator.settings import EACH, Linear, Log, Share
 
 Solref = tuple[Annotated[float, Log(0.001, 0.05)], Annotated[float, Log(0.5, 4)]]
 """Time constant [s] and damping ratio of contacts."""
 
 Solimp = tuple[
-    Annotated[float, Linear(0.5, 0.999)],
-    Annotated[float, Linear(0.9, 0.9999)],
+    Annotated[float, Share(0.5, 0.999)],
+    Annotated[float, Share(0.9, 0.9999)],
     Annotated[float, Log(1e-4, 0.01)],
 ]
 """Impedance of contacts: minimum, maximum, width [m]."""

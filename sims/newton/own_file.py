@@ -16,6 +16,7 @@ import numpy as np
 from pytest_simbench.scene import FloatArray, Scene
 from pytest_simbench.simulator import Deviation, NotSupportedError, lazy_import
 
+from ..mujoco.account import switched_off
 from ..mujoco.constraints import collide
 from ..mujoco.own_file import CLOSE, FILE_MOVES, OwnFile, Told, compared, deviations, pairs
 from ..mujoco.reading import Reading
@@ -204,14 +205,7 @@ def _options(model: Any) -> dict[str, str]:
     if option.disableflags & off.mjDSBL_GRAVITY:
         found["gravity"] = "0 0 0"
     flags = option.disableflags & ~(off.mjDSBL_GRAVITY | off.mjDSBL_AUTORESET)
-    found["disableflags"] = (
-        " ".join(
-            name.removeprefix("mjDSBL_").lower()
-            for name, bit in off.__members__.items()
-            if bit & flags and name.startswith("mjDSBL_")
-        )
-        or "none"
-    )
+    found["disableflags"] = switched_off(flags)
     found["integrator"] = mujoco.mjtIntegrator(option.integrator).name
     return found
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
-from pytest_simbench.simulator.settings import EACH, Linear, Log
+from pytest_simbench.simulator.settings import EACH, Linear, Log, Share
 
 from .drives import Drive
 
@@ -35,7 +35,7 @@ class ODESettings(Settings):
     iterations: Annotated[int, Log(5, 200, when=("solver", "quickstep"))] = 20
     erp: float = 0.2
     cfm: float = 1e-5
-    contact_erp: Annotated[float, Linear(0.05, 0.9)] = 0.2
+    contact_erp: Annotated[float, Share(0.05, 0.9)] = 0.2
     contact_cfm: Annotated[float, Log(1e-8, 0.01)] = 1e-3
     contacts: Annotated[int, Linear(3, 10)] = 10
     friction: Annotated[Literal["pyramid", "slip"], EACH] = "pyramid"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from pytest_simbench.simulator import Seen, Settings, chosen_on
-from pytest_simbench.simulator.settings import EACH, Linear, Log
+from pytest_simbench.simulator.settings import EACH, Linear, Log, Share
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class PyBulletSettings(Settings):
     velocity_gain: float = 1.0
     linear_damping: float = 0.04
     angular_damping: float = 0.04
-    contact_erp: Annotated[float, Linear(0.02, 0.9)] = 0.08
-    friction_erp: Annotated[float, Linear(0.02, 0.9, when=("friction_anchor", True))] = 0.2
+    contact_erp: Annotated[float, Share(0.02, 0.9)] = 0.08
+    friction_erp: Annotated[float, Share(0.02, 0.9, when=("friction_anchor", True))] = 0.2
     cone_friction: Annotated[bool, EACH] = True
     spinning_friction: float = 0.0
     friction_anchor: Annotated[bool, EACH] = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +74,9 @@ REFUSED = {
     "line 1: the file '/a.png' lies out": '<mujoco><texture fileright="/a.png"/></mujoco>',
     "line 1: the file '/a.msh' lies out": '<mujoco><flexcomp file="/a.msh"/></mujoco>',
     "more than 3 elements <body>": f"<mujoco>{4 * '<body/>'}</mujoco>",
+    "more than 3 elements .*, with those": '<replicate count="2"><body/>'
+    '<replicate count="2"><frame><body/></frame></replicate></replicate>',
+    "<body>, with those that": f'<replicate count="{"9" * 5000}"><body/></replicate>',
 }
 
 
@@ -87,6 +91,19 @@ def test_bad_files_are_told_in_one_sentence(
     with pytest.raises(DescriptionError, match=why) as error:
         check_mjcf(str(path))
     assert str(path) in str(error.value)
+
+
+def test_what_is_included_in_a_replicate_counts_as_often(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(mjcf_check.MOST, "body", 3)
+    (tmp_path / "b.xml").write_text("<mujocoinclude><body/></mujocoinclude>")
+    for count, refused in ("3", False), ("x", False), ("-9", False), ("4", True):
+        (tmp_path / "a.xml").write_text(
+            f'<mujoco><replicate count="{count}"><include file="b.xml"/></replicate></mujoco>'
+        )
+        with pytest.raises(DescriptionError, match="more than 3") if refused else nullcontext():
+            check_mjcf(str(tmp_path / "a.xml"))
 
 
 def test_a_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:

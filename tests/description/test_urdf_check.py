@@ -144,7 +144,7 @@ INERTIA = 'ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"'
         (INERTIA, INERTIA.replace("0.01", "-0.1", 1), "principal moments -0.1, 0.01, 0.01 kg m^2"),
         (INERTIA, INERTIA.replace('ixy="0"', 'ixy="1"'), "they must be positive"),
         (INERTIA, INERTIA.replace("0.01", "0"), "they must be positive"),
-        (HAND, "", "has a collision shape of nothing; it must be one box or one mesh"),
+        (HAND, "", "has a collision shape of nothing; it must be one box or mesh"),
         (HAND, '<sphere radius="1"/>', "has a collision shape of <sphere>"),
         (HAND, HAND + HAND, "has a collision shape of <mesh>, <mesh>"),
         ('size="0.1 0.1 0.2"', 'size="0.1 0.1"', "has <box size='0.1 0.1'>; give 3 numbers"),

@@ -169,6 +169,8 @@ def test_packages_are_folders_above_the_file_or_beside_one(tmp_path: Path) -> No
     [
         ('radius=".05"', 'radius="a"', "link 'door' has <sphere radius='a'>"),
         ('<sphere radius=".05"/>', "<mesh/>", "link 'door' has a mesh that cannot be used: ''"),
+        ('<sphere radius=".05"/>', '<sphere radius="51"/>', "a sphere whose size is not .* 50 m"),
+        ('<sphere radius=".05"/>', "<capsule/>", "must be one box, sphere, cylinder or mesh"),
         ('length=".2"', 'length="0"', "link 'drawer' has a cylinder whose size"),
         ('friction=".5"', 'friction="-1"', "joint 'rail' has a damping or friction"),
         ('name="hinge" type="continuous"', 'name="hinge" type="floating"', "'hinge' is floating"),

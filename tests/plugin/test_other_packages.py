@@ -15,6 +15,7 @@ from tests.plugin.inner import FALLING, distribution, importable, records, run_p
 
 GOOD = """
 from dataclasses import replace
+from pytest_simbench.simulator import NotSupportedError
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 class Good(MuJoCo):
@@ -22,6 +23,16 @@ class Good(MuJoCo):
 
 class OnlyDefault(Good):
     profiles = {"default": MuJoCo.profiles["default"]}
+
+class Unable(Good):
+    def load(self, scene):
+        raise NotSupportedError("good has no boxes")
+
+class UnableLater(Good):
+    info = replace(Good.info, name="late")
+
+    def step(self):
+        raise NotSupportedError("late has no steps")
 
 class NoInfo(MuJoCo):
     info = None
@@ -149,6 +160,25 @@ def test_a_profile_that_one_simulator_lacks(pytester: pytest.Pytester, site: Pat
     result = run_pytest(pytester, "--sim=good")
     usage_error(result, "*good has no settings profile 'tuned'; choose from default")
     run_pytest(pytester, "--sim=good --sim-profile=tuned,default --reps=1", passed=1, skipped=1)
+
+
+def test_a_scene_that_a_simulator_cannot_hold_is_no_crash(
+    pytester: pytest.Pytester, site: Path
+) -> None:
+    """It is skipped and told, as where a mark says so; what is missed later is a crash."""
+    distribution(site, "good-sims", "good = good_adapter:Unable")
+    result = run_pytest(
+        pytester, "--sim=good,mujoco --reps=1 --sim-output=out -rs", passed=1, skipped=1
+    )
+    result.stdout.fnmatch_lines(
+        ["mujoco did falling: 1 repetition, none crashed.", "SKIPPED*good has no boxes"]
+    )
+    told = "test_falling[good-headless] was skipped: good has no boxes"
+    assert told in " ".join(result.stdout.str().split())
+    assert [r["simulator"] for r in records(pytester.path / "out")] == ["mujoco"]
+    distribution(site, "late-sims", "late = good_adapter:UnableLater")
+    result = run_pytest(pytester, "--sim=late --reps=1", failed=1)
+    result.stdout.fnmatch_lines(["*EngineFailed in fall (*: late has no steps)*"])
 
 
 COARSER = '''

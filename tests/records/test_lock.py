@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -77,6 +78,14 @@ def test_what_can_be_no_folder_is_one_sentence(tmp_path: Path, kind: str) -> Non
         FolderLock(path)
     expected = f"the run folder {path} cannot be made ({message}); give another folder"
     assert str(caught.value) == expected
+
+
+def test_a_path_that_is_no_utf8_is_refused_by_its_name(tmp_path: Path) -> None:
+    """Workers are told where it is in UTF-8; nothing is made of it."""
+    folder = tmp_path / os.fsdecode(b"lat\xfc") / "run"
+    with pytest.raises(FolderError, match=r"lat.udcfc/run' is no UTF-8, .*; give another folder"):
+        FolderLock(folder)
+    assert not folder.parent.exists()
 
 
 def test_no_space_is_noticed_before_anything_runs(tmp_path: Path) -> None:

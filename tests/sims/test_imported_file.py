@@ -16,7 +16,7 @@ from pytest_simbench.sims.mujoco.adapter import MuJoCo  # noqa: E402
 from pytest_simbench.sims.mujoco.reading import Reading  # noqa: E402
 from pytest_simbench.sims.newton.adapter import Newton  # noqa: E402
 
-from pytest_simbench.client.errors import EngineFailed  # noqa: E402
+from pytest_simbench.client.errors import Unavailable  # noqa: E402
 from pytest_simbench.scene import Pose, Scene  # noqa: E402
 
 from .test_mujoco_articulated import KITCHEN  # noqa: E402
@@ -86,7 +86,7 @@ def test_nothing_is_told_of_what_is_kept(worlds: Worlds, tmp_path: Path) -> None
 
 def test_a_file_that_the_importer_refuses(worlds: Worlds, tmp_path: Path) -> None:
     scene = scene_of(tmp_path, SMALL.replace("<option", '<option solver="PGS"'))
-    with pytest.raises(EngineFailed, match="Newton's importer refuses .*scene.xml: .*pgs"):
+    with pytest.raises(Unavailable, match="Newton's importer refuses .*scene.xml: .*pgs"):
         worlds.load(scene, "file")
 
 

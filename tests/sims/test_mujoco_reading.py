@@ -160,6 +160,14 @@ def test_the_profile_file_needs_a_file(scene: Scene) -> None:
         loaded(MuJoCo, scene, "file")
 
 
+def test_more_shapes_than_can_be_held_against_each_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pytest_simbench.sims.mujoco.reading.MOST_SHAPES", 2)
+    with pytest.raises(DescriptionError, match=r".xml: \d+ shapes collide, and 2 can; leave out"):
+        read(tmp_path)
+
+
 REFUSED = {
     "no shape that collides: box": ('name="g"', 'contype="0" conaffinity="0"'),
     "is not level": ('type="plane"', 'type="plane" euler="10 0 0"'),
@@ -214,6 +222,13 @@ def test_what_is_not_carried_is_told(tmp_path: Path, quantity: str, text: str) -
     told = {line.quantity for line in read(tmp_path, text).account if line.state != "carried"}
     before = {line.quantity for line in read(tmp_path).account if line.state != "carried"}
     assert quantity in told - before
+
+
+def test_what_a_file_switches_off_is_told_by_name(tmp_path: Path) -> None:
+    flags = '<option><flag gravity="disable" spring="disable" limit="disable"/></option>'
+    text = SMALL.replace("<worldbody>", f"{flags}<worldbody>")
+    (told,) = (line for line in read(tmp_path, text).account if line.quantity.endswith("leflags"))
+    assert told.reason.endswith("all else acts; in the file: limit spring gravity")
 
 
 EXCLUDED = "</worldbody><contact><exclude body1='box' body2='ball'/></contact>"

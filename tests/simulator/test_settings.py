@@ -57,6 +57,18 @@ def test_texts_become_values(name: str, text: Any, value: Any) -> None:
         ({"noslip_iterations": "1.5"}, "mujoco.noslip_iterations=1.5: give a whole number"),
         ({"solref": "inf/1"}, "mujoco.solref=inf: give a finite number"),
         ({"solref": 3}, "mujoco.solref=3: give 2 numbers, separated by '/'"),
+        ({"impratio": 0}, "mujoco.impratio=0: give a number above 0, 1 to 100 for instance"),
+        ({"iterations": "-5"}, "mujoco.iterations=-5: give a number above 0"),
+        ({"iterations": 10**26}, "mujoco.iterations=1e.26: give a number below 2147483648"),
+        (
+            {"noslip_iterations": -1},
+            "mujoco.noslip_iterations=-1: give a number from 0 on, 0 to 20 for instance",
+        ),
+        ({"solref": (0.02, 0)}, "mujoco.solref/2=0: give a number above 0"),
+        (
+            {"solimp": "5/5/5"},
+            "mujoco.solimp/1=5: give a number from 0 to 1, 0.5 to 0.999 for instance",
+        ),
         ({3: 3}, "mujoco has no setting 3; choose from .*timestep=0.002"),
         ({"x" * 9999: 3}, "mujoco has no setting 'xxxxx.{,40}; choose from .*timestep=0.002"),
         ({"cone": "x" * 9999}, "mujoco.cone='xxxxx.{,40}: choose from pyramidal, elliptic"),
@@ -70,7 +82,7 @@ def test_bad_changes(changes: dict[str, Any], message: str) -> None:
 def test_every_profile_of_every_engine_has_a_time_step_that_is_fine_enough() -> None:
     for name in registered():
         for settings in adapter(name).profiles.values():
-            assert 0 < changed(settings, {}, name).timestep <= 1 / 60
+            assert 0 < changed(settings, settings.to_wire(), name).timestep <= 1 / 60
 
 
 def test_settings_travel_and_come_back() -> None:
