@@ -20,7 +20,7 @@ from pytest_simbench.simulator.registry import adapter, registered, seeds_seen
 from tests.report.samples import METRICS, record
 from tests.tiny import Falling
 
-TASKS = ("stacking", "throwing", "pushing", "pushing_curve")
+TASKS = ("stacking", "throwing", "pushing", "pushing_curve", "carrying")
 """On whose seeds settings were chosen."""
 
 SEEN = (Seen.seeds("throwing", 2022, 2041), Seen.seeds("stacking", 100, 100))
