@@ -38,6 +38,7 @@ from pytest_simbench.scene import Robot
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.simulator.registry import adapter, known
 from pytest_simbench.tasks.base import Task
+from pytest_simbench.tasks.recorded import look_anew
 
 REFUSED = (SimulatorError, RecordError, DisplayError, NotResumed, ExecutorError, JitterError)
 """What becomes bad input, in its own words."""
@@ -96,6 +97,7 @@ def run(
     }
     wanted = None if reps is None else _read("reps", reps, read.REPETITIONS)
     at_once = _read("jobs", jobs, read.jobs)
+    look_anew()
     task, chosen = checked_task(task, "run"), _chosen(simulators, profile, settings, robot, gui)
     with (
         closing(_locked(folder, resume)) as place,
@@ -197,12 +199,10 @@ def _experiments(
 def _locked(folder: str | Path | None, resume: bool) -> RunFolder:
     """The folder of the run, this process's own; complains of one that holds another run."""
     path = Path(folder) if folder else None  # empty: the default, as on pytest's command line
-    try:
+    with refusing((FolderError, NotResumed)):
         found = run_to_resume(path, Path(RUNS)) if resume else path or new_name(Path(RUNS))
         place = RunFolder(found)
         place.lock()
-    except (FolderError, NotResumed) as error:
-        raise BadInput(str(error).replace("--sim-output", "folder")) from None
     if place.holds_run and not resume:
         place.release()
         raise BadInput(f"{found} already holds a run: give resume=True, or another folder")

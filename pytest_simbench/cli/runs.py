@@ -92,7 +92,8 @@ def _outcome(folders: Folders, readings: dict[str, RunContents]) -> tuple[RunOut
     together = False if False in passed else None if unknown else True
     ended = all(outcome.ended for outcome in outcomes)
     looks = max(outcome.looks for outcome in outcomes)
-    return RunOutcome(together, looks=looks, ended=ended), wrong
+    cut = tuple(sorted({test for outcome in outcomes for test in outcome.cut}))
+    return RunOutcome(together, looks=looks, ended=ended, cut=cut), wrong
 
 
 def _merged(readings: dict[str, RunContents]) -> tuple[list[Merged], RunContents]:

@@ -56,6 +56,7 @@ class Search:
             command = [
                 *(sys.executable, "-m", "pytest", *self.arguments, f"{keep}={self.folder}"),
                 *(f"--sim-name={names}", "--sim-install-missing", "-q", f"--junitxml={judged}"),
+                "--junitprefix=",
             ]
             done = subprocess.run(
                 command, text=True, errors="replace", stdin=subprocess.DEVNULL,

@@ -85,8 +85,12 @@ class Diverged(WorkerError):
 
 
 class Unavailable(WorkerError):
-    """This machine lacks what was asked for, a driver for instance, or the simulator cannot hold
-    the scene; such a test is skipped."""
+    """This machine lacks what was asked for, a driver for instance; such a test is skipped."""
+
+
+class SceneRefused(Unavailable):
+    """The adapter says that it cannot hold the scene, with these settings at least: no fault of the
+    simulator, and nothing was simulated."""
 
 
 class NodeLost(WorkerError):
@@ -130,8 +134,8 @@ REMOTE_ERRORS: dict[str, type[WorkerError]] = {
 }
 """Worker-side error names and what they become here; all others are `EngineFailed`."""
 
-BEFORE_STEPPING = ("compiling", "load")
-"""Phases in which a `NotSupportedError` is `Unavailable`: nothing was simulated."""
+HOLDING = ("compile", "load")
+"""Operations whose `NotSupportedError` is `SceneRefused`."""
 
 
 def exit_text(code: int | None) -> str:

@@ -21,14 +21,14 @@ from pytest_simbench.client import bootstrap, reaper
 from pytest_simbench.client.answers import Constructed, Frame, checked
 from pytest_simbench.client.connection import Connection, RemoteError, elsewhere
 from pytest_simbench.client.errors import (
-    BEFORE_STEPPING,
+    HOLDING,
     REMOTE_ERRORS,
     EngineFailed,
     Interrupted,
     OutOfMemory,
     ProtocolError,
     RepetitionTimeout,
-    Unavailable,
+    SceneRefused,
     Where,
     WorkerError,
     WorkerExited,
@@ -195,7 +195,7 @@ class WorkerProcess:
                     "answers, too"
                 )
             elif "error" in answer:
-                error = self._remote_error(answer["error"])
+                error = self._remote_error(answer["error"], operation)
                 problem = ""
             else:
                 return checked(operation, unpack(answer["ok"]))
@@ -301,10 +301,10 @@ class WorkerProcess:
             except Exception as problem:  # of starting, of sending, or out of the bootstrap there
                 raise self._exited(problem) from None
 
-    def _remote_error(self, error: dict[str, str]) -> WorkerError:
+    def _remote_error(self, error: dict[str, str], operation: str) -> WorkerError:
         kind = REMOTE_ERRORS.get(error["type"], EngineFailed)
-        if error["type"] == "NotSupportedError" and self.where.phase in BEFORE_STEPPING:
-            kind = Unavailable
+        if error["type"] == "NotSupportedError" and operation in HOLDING:
+            kind = SceneRefused
         found = kind(error["message"], self.where, self.launch.log_tail())
         if isinstance(found, EngineFailed):
             found.remote = error["type"]

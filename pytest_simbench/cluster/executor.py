@@ -68,9 +68,9 @@ class Shared:
     @classmethod
     def of(cls, experiment: Experiment, client: str) -> Shared:
         task, robot = experiment.task, experiment.robot
-        known: dict[str, Any] = {"task_code": code_of(task)}
+        known: dict[str, Any] = {"task_code": code_of(task), "scene": scene_digest(task, robot)}
         if robot is not None:
-            known |= {"scene": scene_digest(task, robot), "robot": describe_robot(robot)}
+            known["robot"] = describe_robot(robot)
         return cls(Job.of(experiment, client).pack(), known)
 
 
@@ -175,7 +175,7 @@ class RemoteRepetition:
                 continue
             if "unknown" in answer:
                 continue  # it comes again, and with all of the job
-            lacks = (answer["error"] or {}).get("type") == Unavailable.__name__
+            lacks = (answer["error"] or {}).get("type") == Unavailable.__name__  # no SceneRefused
             avoid.add(self._node.name)
             if lacks and any(self._able(n) and n.name not in avoid for n in self.pool.nodes()):
                 continue  # another node may have the device

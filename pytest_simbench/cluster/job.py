@@ -27,6 +27,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Task
+from pytest_simbench.tasks.source import is_own
 
 OF_THE_MACHINE = ("folder", "python", "spec", "environment", "display", "contended")
 """Attributes of a case that the node finds by itself."""
@@ -146,7 +147,7 @@ class Job:
             made = [policy, *type(policy).__mro__, *type(self.task).__mro__]
             for name in {getattr(one, "__module__", "") for one in made}:
                 module = sys.modules.get(name)
-                if module is not None and not _installed(name, getattr(module, "__file__", None)):
+                if getattr(module, "__file__", None) and is_own(module):
                     cloudpickle.register_pickle_by_value(module)
                     stack.callback(cloudpickle.unregister_pickle_by_value, module)
             written = BytesIO()
@@ -163,17 +164,6 @@ class Job:
         import cloudpickle
 
         return cast("Job", cloudpickle.loads(data))
-
-
-def _installed(name: str, file: str | None) -> bool:
-    """Whether a module is there on every node: this package's, Python's, or a distribution's."""
-    top = name.partition(".")[0]
-    return (
-        file is None
-        or top == "pytest_simbench"
-        or top in sys.stdlib_module_names
-        or "site-packages" in Path(file).parts
-    )
 
 
 class TaskFailed(Exception):

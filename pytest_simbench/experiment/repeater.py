@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from typing import Protocol as Interface
 
-from pytest_simbench.client.errors import Unavailable, WorkerError, WorldParityError
+from pytest_simbench.client.errors import SceneRefused, Unavailable, WorkerError, WorldParityError
 from pytest_simbench.experiment.executor import Executor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.interrupts import Interrupts
@@ -18,6 +18,7 @@ from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import short
+from pytest_simbench.tasks.recorded import code_of
 
 __tracebackhide__ = True  # a mistake in a task is told at its own line
 
@@ -42,6 +43,8 @@ class Repeater:
         keep: takes every record at once, before anything else can go wrong.
         begin: is called before the first progress.
         resumed: the interrupted run that is completed, if one is.
+        records_refusals: whether a scene that is refused is a repetition that failed, as it is at
+            another time step, and after a repetition of the same test that was not refused.
     """
 
     experiment: Experiment
@@ -50,6 +53,8 @@ class Repeater:
     keep: Callable[[Record], None]
     begin: Callable[[], None] = lambda: None
     resumed: Resumed | None = None
+    records_refusals: bool = False
+    _ended_early: bool = field(default=False, init=False)
     _active: set[AnyRepetition] = field(default_factory=set, init=False)
     _stopping: threading.Event = field(default_factory=threading.Event, init=False)
 
@@ -60,6 +65,8 @@ class Repeater:
         missing = [k for k in range(1, number + 1) if k not in found]
         self.experiment.check_jitter(missing)
         if missing:
+            self.records_refusals |= bool(found)
+            code_of(self.experiment.task)  # as it is before it acts
             if self.resumed is not None:
                 self.resumed.check_versions(self.experiment, self.executor)
             self.begin()
@@ -70,7 +77,8 @@ class Repeater:
         """Run the repetitions of these numbers.
 
         Raises:
-            Unavailable: the machine lacks what it takes, in this mode at least.
+            Unavailable: the machine lacks what it takes, in this mode at least, or the scene of the
+                first repetition is refused.
             WorldParityError: the engine builds another world; more repetitions would not help.
             KeyboardInterrupt: after the records of what was running are kept.
         """
@@ -123,10 +131,16 @@ class Repeater:
             repetition.kill()
         record, error = repetition.run()
         self._active.discard(repetition)
-        if isinstance(error, Unavailable):  # nothing was simulated: there is nothing to record
+        a_failure = self.records_refusals or experiment.case.own_timestep is not None
+        told = isinstance(error, SceneRefused) and a_failure
+        if isinstance(error, Unavailable) and not told:  # nothing was simulated
+            self._ended_early = True
             raise error
-        if error is not None and not begun and record.status == "interrupted":
-            raise error  # it waited for a node
+        if error is not None and record.status == "interrupted":
+            if self._ended_early or not begun:
+                raise error  # it was ended with one that is not recorded, or waited for a node
+        else:
+            self.records_refusals = True
         self.keep(record)
         progress.end_repetition(record.status, record.seconds["total"])
         return record, error

@@ -7,7 +7,7 @@ their own (`crashes`). A run without a true change fails in at most one of twent
 limits together. A limit that compares nothing fails the run.
 
 What it needs: a change of d with a spread of s between repetitions is found in 4 of 5 cases by
-about 12 (s / d)^2 repetitions (`power.repetitions_to_detect`), if its limit is well below d. A loss
+about 12 (s / d)^2 repetitions, if its limit is well below d. A loss
 of 10 points in *placed* against `placed:5%,ram:10%,rtf:20%` is found by 20 repetitions in 99 of 100
 runs when every cube is lost a little more often (s = 9 points), but only in 25 when one repetition
 in five loses half its cubes (s = 20): that takes about 45, and one in ten that loses all of them

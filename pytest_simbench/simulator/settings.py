@@ -184,11 +184,14 @@ class Share(Linear):
         return "" if 0 <= value <= 1 else "a number from 0 to 1"
 
 
+@dataclass(frozen=True)
 class Log(Linear):
-    """The same on a logarithmic scale."""
+    """The same on a logarithmic scale, which has no `zero`; some settings have it."""
+
+    zero: bool = field(default=False, kw_only=True)
 
     def problem(self, value: float) -> str:
-        return "" if value > 0 else "a number above 0"
+        return "" if value > 0 or (self.zero and not value) else "a number above 0"
 
     def __str__(self) -> str:
         return f"{super().__str__()} log"

@@ -13,12 +13,13 @@ from typing import Any
 import pytest
 
 from pytest_simbench.client.environments import missing
+from pytest_simbench.client.errors import SceneRefused
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import known
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator import Capability, Simulator
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.testing.subject import Subject
+from pytest_simbench.testing.subject import ConformanceFailure, Subject
 
 Law = Callable[[Subject], None]
 
@@ -185,6 +186,10 @@ class ConformanceTest:
             self.check.law(self.subject)
         except pytest.skip.Exception:
             raise
+        except SceneRefused as error:  # what it claims to hold
+            if reason is None:
+                raise ConformanceFailure(error.what) from None
+            pytest.xfail(f"{reason} ({error})")
         except Exception as error:
             if reason is None:
                 raise

@@ -61,7 +61,9 @@ class Runs:
         if missing := [number for number in numbers if number not in kept]:
             self.folder.describe(experiment.task)
             before = len(self.folder.own)
-            repeater = Repeater(experiment, self.executor, self.progress, self.folder.append)
+            repeater = Repeater(
+                experiment, self.executor, self.progress, self.folder.append, records_refusals=True
+            )
             try:
                 repeater.run(missing)
             except Unavailable as error:

@@ -29,7 +29,7 @@ class DARTSettings(Settings):
     detector: Annotated[Literal["fcl", "ode", "bullet", "dart"], EACH] = "fcl"
     solver: Annotated[Literal["dantzig", "pgs", "nsgs"], EACH] = "dantzig"
     sweeps: Annotated[int, Log(5, 300, when=("solver", "pgs", "nsgs"))] = 100
-    tolerance: Annotated[float, Log(1e-6, 0.01, when=("solver", "pgs", "nsgs"))] = 1e-5
+    tolerance: Annotated[float, Log(1e-6, 0.01, when=("solver", "pgs", "nsgs"), zero=True)] = 1e-5
     sleeping: bool = True
     split_impulse: Annotated[bool, EACH] = False
 

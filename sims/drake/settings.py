@@ -42,8 +42,10 @@ class DrakeSettings(Settings):
     compliance: Literal["undefined", "rigid", "compliant"] = "undefined"
     hydroelastic_modulus: float = 1e7
     point_stiffness: Annotated[float, Log(1e4, 1e8)] = 1e6
-    hunt_crossley_dissipation: Annotated[float, Log(1, 200, when=LAGGED)] = 50.0
-    relaxation_time: Annotated[float, Log(1e-3, 0.5, when=("approximation", "sap"))] = 0.1
+    hunt_crossley_dissipation: Annotated[float, Log(1, 200, when=LAGGED, zero=True)] = 50.0
+    relaxation_time: Annotated[float, Log(1e-3, 0.5, when=("approximation", "sap"), zero=True)] = (
+        0.1
+    )
     corner_radius: float = 0.0
     pad_radius: float = 0.0
     shrink: float = 0.0

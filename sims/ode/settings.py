@@ -36,7 +36,7 @@ class ODESettings(Settings):
     erp: float = 0.2
     cfm: float = 1e-5
     contact_erp: Annotated[float, Share(0.05, 0.9)] = 0.2
-    contact_cfm: Annotated[float, Log(1e-8, 0.01)] = 1e-3
+    contact_cfm: Annotated[float, Log(1e-8, 0.01, zero=True)] = 1e-3
     contacts: Annotated[int, Linear(3, 10)] = 10
     friction: Annotated[Literal["pyramid", "slip"], EACH] = "pyramid"
     drive: Drive = "velocity"

@@ -15,6 +15,7 @@ from tests.plugin.inner import FALLING, distribution, importable, records, run_p
 
 GOOD = """
 from dataclasses import replace
+from pathlib import Path
 from pytest_simbench.simulator import NotSupportedError
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
@@ -27,6 +28,16 @@ class OnlyDefault(Good):
 class Unable(Good):
     def load(self, scene):
         raise NotSupportedError("good has no boxes")
+
+class Picky(Good):
+    info = replace(Good.info, name="picky")
+
+    def load(self, scene):
+        seen = Path(__file__).with_suffix(".seen")
+        if seen.exists():
+            raise NotSupportedError("good has one scene")
+        seen.touch()
+        super().load(scene)
 
 class UnableLater(Good):
     info = replace(Good.info, name="late")
@@ -165,7 +176,8 @@ def test_a_profile_that_one_simulator_lacks(pytester: pytest.Pytester, site: Pat
 def test_a_scene_that_a_simulator_cannot_hold_is_no_crash(
     pytester: pytest.Pytester, site: Path
 ) -> None:
-    """It is skipped and told, as where a mark says so; what is missed later is a crash."""
+    """It is skipped and told, as where a mark says so; what is missed later, or of one scene of
+    several, is a crash."""
     distribution(site, "good-sims", "good = good_adapter:Unable")
     result = run_pytest(
         pytester, "--sim=good,mujoco --reps=1 --sim-output=out -rs", passed=1, skipped=1
@@ -176,6 +188,10 @@ def test_a_scene_that_a_simulator_cannot_hold_is_no_crash(
     told = "test_falling[good-headless] was skipped: good has no boxes"
     assert told in " ".join(result.stdout.str().split())
     assert [r["simulator"] for r in records(pytester.path / "out")] == ["mujoco"]
+    distribution(site, "picky-sims", "picky = good_adapter:Picky")
+    run_pytest(pytester, "--sim=picky --reps=2 --sim-output=two", failed=1)
+    told = [(r["status"], (r["error"] or {}).get("type")) for r in records(pytester.path / "two")]
+    assert told == [("ok", None), ("failed", "SceneRefused")]
     distribution(site, "late-sims", "late = good_adapter:UnableLater")
     result = run_pytest(pytester, "--sim=late --reps=1", failed=1)
     result.stdout.fnmatch_lines(["*EngineFailed in fall (*: late has no steps)*"])

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import pytest
+
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
-
 from pytest_simbench.simulator import Settings, SettingsError
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.simulator.settings import (
@@ -77,6 +77,11 @@ def test_texts_become_values(name: str, text: Any, value: Any) -> None:
 def test_bad_changes(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SettingsError, match=message):
         changed(MuJoCoSettings(), changes, "mujoco")
+
+
+def test_settings_that_are_searched_on_a_logarithmic_scale_may_have_zero() -> None:
+    hard = changed(adapter("ode").profiles["tuned"], {"contact_cfm": 0}, "ode")
+    assert hard.to_wire()["contact_cfm"] == 0
 
 
 def test_every_profile_of_every_engine_has_a_time_step_that_is_fine_enough() -> None:

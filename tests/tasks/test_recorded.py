@@ -9,13 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.tasks.recorded import digest
+from pytest_simbench.tasks.recorded import digest, look_anew
 
 HEAD = "import functools\nimport numpy as np\nimport other\nfrom other import far\nG = 0.5\n"
 CLASS = "class P:\n    def act(self, seen):\n        return {}\n"
 STATIC = "    @staticmethod\n    def g():\n        return G\n"
+CACHE = (
+    CLASS.format("load()") + "def load():\n    global made\n    made = made or G\n    return made\n"
+)
 PROPERTY = "    @property\n    def g(self):\n        return G\n"
-OTHER = "V = 0.5\nclass Made:\n    def go(self): return 0.5\ndef far(): return 0.5\nmade = Made()\n"
+OTHER = (
+    "V = 0.5\nclass Made:\n    def go(self): return V\ndef far(): return 0.5\nmade = Made()\n"
+    "def act(a, b): return far()\n"
+)
 
 
 def of(folder: Path, text: str, other: str) -> str:
@@ -23,16 +29,17 @@ def of(folder: Path, text: str, other: str) -> str:
     folder.mkdir(exist_ok=True)
     (folder / "policy.py").write_text(text)
     (folder / "other.py").write_text(other)
+    (folder / "pack").mkdir(exist_ok=True)
+    (folder / "pack" / "inner.py").write_text(other.replace("V", "G"))
     linecache.checkcache()
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(folder))
         patch.setattr(sys, "dont_write_bytecode", True)
-        for name in ("other", "policy"):
-            patch.delitem(sys.modules, name, raising=False)
         try:
             return digest(importlib.import_module("policy").P())
         finally:
-            sys.modules.pop("policy", None), sys.modules.pop("other", None)
+            for name in ("policy", "other", "pack", "pack.inner"):
+                sys.modules.pop(name, None)
 
 
 @pytest.mark.parametrize(
@@ -55,6 +62,14 @@ def of(folder: Path, text: str, other: str) -> str:
         CLASS.format("far()"),
         CLASS.format("other.Made().go()"),
         CLASS.format("other.made.go()"),
+        "class H(other.Made): pass\n" + CLASS.format("H().go()"),
+        "go = other.made.go\n" + CLASS.format("go()"),
+        "go = functools.partial(other.act, 1, 2)\n" + CLASS.format("go()"),
+        "import pack.inner\n" + CLASS.format("pack.inner.G"),
+        "def twice(f):\n    def g(*a): return 0.5\n    return g\n"
+        + CLASS.replace("    def", "    @twice\n    def").format("1"),
+        "class P:\n    def act(self, seen): return G\nact, P = P().act, lambda: act\n",
+        "class P:\n    @classmethod\n    def act(cls): return G\nact, P = P.act, lambda: act\n",
     ],
 )
 def test_what_is_taken_from_elsewhere_counts(tmp_path: Path, text: str) -> None:
@@ -65,10 +80,27 @@ def test_what_is_taken_from_elsewhere_counts(tmp_path: Path, text: str) -> None:
     assert of(tmp_path / "c", theirs, others[1]) != before
 
 
-def test_comments_and_layout_do_not_count(tmp_path: Path) -> None:
-    text = HEAD + CLASS.format("G")
-    told = text.replace("return G", "# as far as it goes\n        return (G)  # half")
-    assert of(tmp_path / "a", text, OTHER) == of(tmp_path / "b", told, OTHER)
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (CLASS.format("G"), CLASS.format("(G)  # half").replace("class", "# as it was\n\nclass")),
+        *[(f"{CACHE}made = None\n", f"{CACHE}made = 0.5\n")],  # it is made when it is needed first
+    ],
+)
+def test_what_does_not_count(tmp_path: Path, text: str, told: str) -> None:
+    assert of(tmp_path / "a", HEAD + text, OTHER) == of(tmp_path / "b", HEAD + told, OTHER)
+
+
+def test_another_machine_has_the_files_elsewhere(tmp_path: Path) -> None:
+    """Paths count as seen from the code, others as they are."""
+    head = (
+        "import os, pathlib\nW = pathlib.Path(__file__).parent\nX = os.path.join(W.parent, 'x')\n"
+    )
+    text = head + "DATA = '/data/weights'\n" + CLASS.format("W, X, DATA, __file__")
+    first = of(tmp_path / "a", text, OTHER)
+    assert of(tmp_path / "b", text, OTHER) == first
+    assert of(tmp_path / "c", text.replace("'x'", "'y'"), OTHER) != first
+    assert of(tmp_path / "d", text.replace("/data", "/other"), OTHER) != first
 
 
 def test_code_without_a_file_counts_too() -> None:
@@ -79,5 +111,11 @@ def test_code_without_a_file_counts_too() -> None:
         return digest(space["P"]())
 
     assert written("0.5") == written("0.5") != written("0.1")
+    exec(HEAD.partition("import other")[0] + CLASS.format("far()"), space := {"__name__": "cell"})
+    space["far"] = lambda: 0.5
+    before = digest(space["P"]())
+    space["far"] = lambda: 0.1
+    look_anew()
+    assert digest(space["P"]()) != before
     words = "seen in {'a', 'b', 'c', 'd'}"  # a set has another order in each process
     assert written(words) == written(words)

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
+from pytest_simbench.client.errors import SceneRefused, Where
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import BUILT_IN, find
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.simulator.registry import UnknownSimulatorError
 from pytest_simbench.testing import CHECKS, ConformanceTest, ConformanceWarning, Subject
 from pytest_simbench.testing.faults import robot_faults, rounds
@@ -26,6 +27,7 @@ from pytest_simbench.testing.kit import (
     unmatched,
 )
 from pytest_simbench.testing.scenes import approaches, at_random, beside, lifted, link_clouds
+from pytest_simbench.testing.subject import ConformanceFailure
 
 LAWS = ("free_fall", "static_hold", "grip_holds", "fingers_stay_coupled")
 KIT = Kit((Subject(MuJoCo),), LAWS, {})
@@ -64,6 +66,14 @@ def test_expected_failures_of_other_robots_match(robot: str) -> None:
     for pattern in (f"mujoco-tuned-{robot}-hold", f"mujoco-tune-{robot}-static_hold"):
         with pytest.warns(ConformanceWarning, match="matches no check"):
             conformance_checks("mujoco", expected_failures={pattern: "soft"})
+
+
+def test_a_scene_that_is_refused_although_it_is_claimed_fails() -> None:
+    def law(subject: Subject) -> None:
+        raise SceneRefused("it has no boxes", Where("mujoco", "headless"))
+
+    with pytest.raises(ConformanceFailure, match="it has no boxes"):
+        ConformanceTest(Subject(MuJoCo), replace(CHECKS["free_fall"], law=law))()
 
 
 @pytest.mark.parametrize(("pattern", "warned"), [("static_hold", 0), ("*-ur5-static_hold", 1)])

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.client.errors import SceneRefused, Where
 from pytest_simbench.records.record import Failure
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tuning.target import TuningError
@@ -49,6 +50,15 @@ def test_a_step_that_divides_no_period_fails_that_candidate_alone(tmp_path: Path
     told = {"status": "failed", "error": Failure("LoopError", str(error), "")}
     executor.end = lambda experiment, number: (told, error)
     assert looks.choose("trial1", {"timestep": 0.003}, [today]).ended == "failed: LoopError"
+
+
+def test_settings_that_an_adapter_refuses_fail_that_candidate_alone(tmp_path: Path) -> None:
+    looks, executor = trials(tmp_path, lambda s, k: 1.0)
+    today, error = looks.today(), SceneRefused("no such drive", Where("mujoco", "headless"))
+    told = {"status": "failed", "error": Failure("SceneRefused", error.what, "load")}
+    executor.end = lambda experiment, number: (told, error)
+    found = looks.choose("trial1", {"timestep": 0.003}, [today])
+    assert found.ended == "failed: SceneRefused in load"
 
 
 @pytest.mark.parametrize("jobs", [1, 3, 16])

@@ -113,7 +113,7 @@ def cut_at(
     folder: Path, before: Iterable[Record], now: Iterable[Record], judged: Collection[str]
 ) -> tuple[str, ...]:
     """Tests that have repetitions, and now or before were not `judged`."""
-    known = {(r.test, r.repetition) for r in before}
+    known = {(r.test, r.repetition) for r in before if r.status != "interrupted"}
     begun = {r.test for r in now if (r.test, r.repetition) not in known}
     return tuple(sorted({*_so_far(folder).cut, *begun}.difference(judged)))
 

@@ -14,7 +14,7 @@ import pytest
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import Limit
 from pytest_simbench.report.files import write_outcome
-from pytest_simbench.report.model.outcome import NAME, RunOutcome, looks_at
+from pytest_simbench.report.model.outcome import NAME, RunOutcome, cut_at, looks_at
 from tests.report.samples import METRICS, record
 
 
@@ -93,4 +93,6 @@ def test_a_run_that_was_interrupted_before_anything_ended_was_not_looked_at(tmp_
     assert looks_at(tmp_path, [ended, interrupted], [ended, record(repetition=1)]) == 2
     another = record(repetition=1, simulator="mujoco==3.3.7", test="test_x[mujoco==3.3.7-headless]")
     assert looks_at(tmp_path, [ended], [ended, another]) == 2  # of a history that has grown
+    whole = replace(interrupted, status="ok")
+    assert cut_at(tmp_path, [ended, interrupted], [ended, whole], ()) == (ended.test,)
     assert looks_at(tmp_path, [ended, ended], [ended, record(repetition=3)]) == 3  # run again
