@@ -133,12 +133,12 @@ def _end(started: Sequence[Future[Again]], handles: Sequence[SimulatorHandle | s
     """End what runs side by side."""
     for future in started:
         future.cancel()
-    while True:
+    going = True
+    while going:
+        going = bool(wait(started, timeout=0.1).not_done)
         for handle in handles:  # a worker that was just being started is there in the next round
             if isinstance(handle, SimulatorHandle):
                 handle.close()
-        if not wait(started, timeout=0.1).not_done:
-            return
 
 
 def _restored_at(
