@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import pytest
-
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
+
 from pytest_simbench.simulator import Settings, SettingsError
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.simulator.settings import (

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.client.errors import SceneRefused, Where
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import BUILT_IN, find
-from pytest_simbench.sims.mujoco.adapter import MuJoCo
 from pytest_simbench.simulator.registry import UnknownSimulatorError
 from pytest_simbench.testing import CHECKS, ConformanceTest, ConformanceWarning, Subject
 from pytest_simbench.testing.faults import robot_faults, rounds
