@@ -54,6 +54,7 @@ class Repeater:
     begin: Callable[[], None] = lambda: None
     resumed: Resumed | None = None
     records_refusals: bool = False
+    _recorded: bool = field(default=False, init=False)
     _ended_early: bool = field(default=False, init=False)
     _active: set[AnyRepetition] = field(default_factory=set, init=False)
     _stopping: threading.Event = field(default_factory=threading.Event, init=False)
@@ -65,7 +66,7 @@ class Repeater:
         missing = [k for k in range(1, number + 1) if k not in found]
         self.experiment.check_jitter(missing)
         if missing:
-            self.records_refusals |= bool(found)
+            self._recorded = bool(found)
             code_of(self.experiment.task)  # as it is before it acts
             if self.resumed is not None:
                 self.resumed.check_versions(self.experiment, self.executor)
@@ -131,7 +132,7 @@ class Repeater:
             repetition.kill()
         record, error = repetition.run()
         self._active.discard(repetition)
-        a_failure = self.records_refusals or experiment.case.own_timestep is not None
+        a_failure = self._recorded or self.records_refusals or experiment.case.own_timestep
         told = isinstance(error, SceneRefused) and a_failure
         if isinstance(error, Unavailable) and not told:  # nothing was simulated
             self._ended_early = True
@@ -140,7 +141,7 @@ class Repeater:
             if self._ended_early or not begun:
                 raise error  # it was ended with one that is not recorded, or waited for a node
         else:
-            self.records_refusals = True
+            self._recorded = True
         self.keep(record)
         progress.end_repetition(record.status, record.seconds["total"])
         return record, error

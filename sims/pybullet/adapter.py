@@ -137,7 +137,8 @@ class PyBullet(Simulator):
         self._bodies = {body.name: add_body(c, body, s, heavy(scene)) for body in scene.bodies}
         self._free = [self._bodies[box.name] for box in scene.free_bodies]
         self._led = [self._bodies[body.name] for body in scene.prescribed_bodies]
-        self._before, self._falls = np.empty((0, 13)), s.timestep * np.asarray(scene.gravity)
+        self._leading: list[tuple[int, FloatArray]] = []
+        self._falls = s.timestep * np.asarray(scene.gravity)
         self._part_from_still(scene)
         self._robot = -1
         self._anchors: Anchors | None = None
@@ -243,10 +244,10 @@ class PyBullet(Simulator):
             pybullet.applyExternalTorque(body, -1, torque, pybullet.WORLD_FRAME, c)
 
     def lead(self, before: FloatArray, after: FloatArray) -> None:
-        self._before = before
+        self._leading = list(zip(self._led, before, strict=True))
 
     def step(self) -> None:
-        for body, row in zip(self._led, self._before, strict=False):
+        for body, row in self._leading:
             w, x, y, z = row[3:7]
             pybullet.resetBasePositionAndOrientation(body, row[:3], [x, y, z, w], self.client)
             # Bullet has one gravity for all, which acts before contacts do

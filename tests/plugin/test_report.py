@@ -66,9 +66,8 @@ def test_an_interrupt_between_two_repetitions_is_no_look(pytester: pytest.Pytest
 
 
 def test_a_run_that_was_killed_has_not_passed(pytester: pytest.Pytester) -> None:
-    pytester.makepyfile(
-        test_it=CLAIMING + "    __import__('signal').raise_signal(9)\n", test_a=CLAIMING
-    )
+    killed = CLAIMING + "    __import__('signal').raise_signal(9)\n"
+    pytester.makepyfile(test_it=killed, test_a=CLAIMING)
     assert run(pytester).ret == -signal.SIGKILL
     simbench(pytester, "report", "o")
     report = pytester.path / "o" / "report.md"

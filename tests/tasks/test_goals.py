@@ -151,17 +151,6 @@ def test_a_record_tells_which_policy_it_was() -> None:
         lambda gain: [{frozenset({gain})}, np.array([Held(gain)])],
     ):  # fmt: skip
         assert digest(Held(held(1.0))) == digest(Held(held(1.0))) != digest(Held(held(2.0)))
-    for text in (
-        "def act(seen): return GAIN", "def far(): return GAIN\ndef act(seen): return far()",
-        "class Base:\n def act(self, seen): return GAIN\nclass Mine(Base): pass\nact = Mine()",
-        "def act(seen): return ROWS[0]",
-    ):  # fmt: skip
-
-        def written(gain: float, text: str = text) -> Any:
-            exec(text, space := {"GAIN": gain, "ROWS": [{"a": gain}], "__name__": "mine"})
-            return space["act"]
-
-        assert digest(written(1.0)) == digest(written(1.0)) != digest(written(2.0))
     quiet, loud = lambda seen: None, lambda seen: 1.0
     assert digest(quiet) != digest(loud)
     one, other = (make_dataclass(name, ["gain"], frozen=True)(1.0) for name in ("One", "Other"))
