@@ -5,7 +5,7 @@
     python==3.11           of Python: a task that a test defines travels as code
     mysim==4.0.0           a simulator that is ready there, and the engine's version
     mysim==3.3.7==3.3.7    the same of a release that has an environment of its own there
-    display, gpu, vulkan   a display (its own or Xvfb), a GPU of NVIDIA's, a Vulkan device
+    display                for windows: its own, or Xvfb
 
 Names are all that Dask keeps, so versions stand in them. The amount of each is the number of slots.
 """
@@ -13,13 +13,11 @@ Names are all that Dask keeps, so versions stand in them. The amount of each is 
 from __future__ import annotations
 
 import shutil
-import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from os import environ
-from pathlib import Path
 
 from pytest_simbench import __version__
 from pytest_simbench.client.environments import existing, missing, outside
@@ -28,24 +26,9 @@ from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.registry import adapter, problem, registered
 
 SLOTS = "simbench"
-DISPLAY, GPU, VULKAN = "display", "gpu", "vulkan"
-DEVICES = (DISPLAY, GPU, VULKAN)
+DISPLAY = "display"
 PYTHON = f"python=={sys.version_info.major}.{sys.version_info.minor}"
 PLUGIN = f"{SLOTS}=={__version__}"
-
-VULKAN_PROBE = """
-import ctypes
-vulkan = ctypes.CDLL("libvulkan.so.1")
-info = (ctypes.c_uint64 * 8)(1)  # VkInstanceCreateInfo: sType 1, all else empty
-instance, count = ctypes.c_void_p(), ctypes.c_uint32()
-assert vulkan.vkCreateInstance(info, None, ctypes.byref(instance)) == 0
-assert vulkan.vkEnumeratePhysicalDevices(instance, ctypes.byref(count), None) == 0
-assert count.value
-"""
-"""Ends well where there is a Vulkan device. In a process of its own: a driver may crash."""
-
-PROBE_TIMEOUT = 30.0
-"""For the probe of Vulkan [s]: a driver may hang."""
 
 
 def here(slots: int, names: Iterable[str] | None = None) -> dict[str, float]:
@@ -63,10 +46,6 @@ def here(slots: int, names: Iterable[str] | None = None) -> dict[str, float]:
             found.append(f"{name}=={_version(info)}")
     if environ.get("DISPLAY") or environ.get("WAYLAND_DISPLAY") or shutil.which("Xvfb"):
         found.append(DISPLAY)
-    if Path("/proc/driver/nvidia/version").exists():
-        found.append(GPU)
-    if _vulkan():
-        found.append(VULKAN)
     return dict.fromkeys(found, float(slots))
 
 
@@ -84,14 +63,6 @@ def _version(info: SimulatorInfo) -> str:
         return "unknown"
 
 
-def _vulkan() -> bool:
-    command = [sys.executable, "-c", VULKAN_PROBE]
-    try:
-        return subprocess.run(command, capture_output=True, timeout=PROBE_TIMEOUT).returncode == 0
-    except (OSError, subprocess.SubprocessError):
-        return False
-
-
 @dataclass(frozen=True)
 class Node:
     """A node as the scheduler knows it.
@@ -101,14 +72,14 @@ class Node:
         slots: repetitions at once.
         versions: of the plugin, of Python and of its simulators, by name; a release by its own
             name, `mysim==3.3.7`.
-        devices: those of `DEVICES` that it has.
+        display: whether it has one.
     """
 
     address: str
     name: str
     slots: int
     versions: Mapping[str, str]
-    devices: tuple[str, ...]
+    display: bool
 
     @classmethod
     def of(cls, address: str, name: object, resources: Mapping[str, float]) -> Node | None:
@@ -117,8 +88,7 @@ class Node:
             return None
         parts = [offer.rpartition(RELEASE) for offer in sorted(resources) if RELEASE in offer]
         versions = {name: found for name, _, found in parts}
-        devices = tuple(device for device in DEVICES if device in resources)
-        return cls(address, str(name), int(resources[SLOTS]), versions, devices)
+        return cls(address, str(name), int(resources[SLOTS]), versions, DISPLAY in resources)
 
     @property
     def stranger(self) -> str:
@@ -131,11 +101,7 @@ class Node:
 
     def has(self, simulator: str, mode: str) -> bool:
         """Whether it can carry out repetitions of a simulator in a mode."""
-        return (
-            not self.stranger
-            and simulator in self.versions
-            and (mode != "gui" or DISPLAY in self.devices)
-        )
+        return not self.stranger and simulator in self.versions and (mode != "gui" or self.display)
 
     def __str__(self) -> str:
         told = [
@@ -143,7 +109,7 @@ class Node:
             for name, found in self.versions.items()
             if name not in (SLOTS, "python")
         ]
-        return f"{self.name} has {', '.join([*told, *self.devices]) or 'no simulator'}"
+        return f"{self.name} has {', '.join(told + [DISPLAY] * self.display) or 'no simulator'}"
 
 
 def refusal(nodes: Sequence[Node]) -> str:
