@@ -108,6 +108,13 @@ def test_columns_are_read_between_samples() -> None:
     assert seen.at(0.15, values[:, 1]) == pytest.approx(20.0)
 
 
+def test_a_level_is_crossed_upwards_once_where_a_sample_lies_on_it() -> None:
+    t, none = np.array([1.0, 2.0, 4.0, 5.0, 7.0, 8.0]), np.empty((6, 0))
+    values = np.array([1.0, 5.0, 6.0, 2.0, 10.0, 3.0])
+    seen = Watched(1.0, t, none, none, none)
+    assert seen.crossings(values, 5.0).tolist() == [2.0, 5.75]
+
+
 def test_a_reading_is_an_error_and_its_ratio_to_the_tolerance() -> None:
     reading = Reading(value=1.2, exact=1.0, tolerance=0.1)
     assert reading.error == pytest.approx(0.2)
