@@ -87,7 +87,10 @@ def test_candidates_throw_there_within_their_limits() -> None:
     model, scale = RobotModel(find("ur5")), 0.9
     limits = model.limits.column("velocity")
     _, moving = _in_plane(model, 1.2)
-    for share, joints, velocity in islice(_candidates(model, GRAVITY, 1.2, scale), 3):
+    found = list(islice(_candidates(model, GRAVITY, 1.2, scale), 3))
+    again = next(_candidates(model, GRAVITY, 1.2, scale))
+    assert (len(found), again.joints.tolist()) == (3, found[0].joints.tolist())
+    for share, joints, velocity in found:
         tool, flight = model.tool_transform(joints), model.tool_velocity(joints, velocity)
         position = tool.translation
         landed = landing_x(position, flight, GRAVITY, LANDING_HEIGHT * scale)
