@@ -14,6 +14,7 @@ from pytest_simbench.client.environments import missing
 from pytest_simbench.laws import LAWS, Law, Reading
 from pytest_simbench.laws.base import Watched
 from pytest_simbench.laws.hands import PushTurns
+from pytest_simbench.laws.impact import RADIUS, BounceHeight
 from pytest_simbench.laws.mechanisms import MOUNT, Part, mechanism
 from pytest_simbench.laws.sticking import fan
 from pytest_simbench.measure.phenomena import BROKEN, KEPT
@@ -106,6 +107,27 @@ def test_columns_are_read_between_samples() -> None:
     values = np.array([[0.0, 10.0], [1.0, 30.0]])
     assert seen.at(0.15, values) == pytest.approx([0.5, 20.0])
     assert seen.at(0.15, values[:, 1]) == pytest.approx(20.0)
+
+
+def test_a_level_is_crossed_upwards_once_where_a_sample_lies_on_it() -> None:
+    t, none = np.array([1.0, 2.0, 4.0, 5.0, 7.0, 8.0]), np.empty((6, 0))
+    values = np.array([1.0, 5.0, 6.0, 2.0, 10.0, 3.0])
+    seen = Watched(1.0, t, none, none, none)
+    assert seen.crossings(values, 5.0).tolist() == [2.0, 5.75]
+
+
+@pytest.mark.parametrize(
+    ("heights", "found"), [((9, 1, 7, 3, 2), (7, 3)), ((9, 1, 2, 8, 4), (2, 8))]
+)
+def test_each_bounce_is_looked_for_in_its_time(
+    heights: tuple[float, ...], found: tuple[float, float]
+) -> None:
+    """The first one from the landing on, for a time of two e of the fall, which is one here."""
+    law, bodies = BounceHeight(restitution=0.5, height=0.2), np.zeros((5, 1, 13))
+    bodies[:, 0, 2] = np.array(heights) / 10 + RADIUS
+    t = law.fall * np.array([0.99, 1.01, 1.99, 2.01, 3.5])
+    seen = Watched(0.1, t, np.empty((5, 0)), bodies, bodies[0])
+    assert law.rises(seen) == pytest.approx(np.divide(found, 10))
 
 
 def test_a_reading_is_an_error_and_its_ratio_to_the_tolerance() -> None:

@@ -49,6 +49,11 @@ def test_ends_within_a_millimetre_are_alike_also_through_a_third() -> None:
     assert sentences(found)[0] == (
         "As written, bowl ends in 2 ways: a, b and c; d. They differ by up to 5 mm (bowl, a and d)."
     )
+    many = one(*(end(who, 0.5 * k) for k, who in enumerate("abcdef")), end("z", 10.0))
+    assert sentences(many)[0] == (
+        "As written, bowl ends in 2 ways: a, b, c, d and 2 more; z. They differ by up to 10 mm "
+        "(bowl, a and z)."
+    )
     assert sentences(one(end("a", 0.0), end("b", 0.9))) == [
         "As written, bowl ends alike in all 2, within 1 mm."
     ]
@@ -57,7 +62,10 @@ def test_ends_within_a_millimetre_are_alike_also_through_a_third() -> None:
 def test_a_difference_that_a_moved_start_makes_too_is_noise() -> None:
     apart = [end("a", 0.0), end("b", 10.0)]
     still = [end(who, at, moved=1e-4, seed=k) for who, at in (("a", 0), ("b", 10)) for k in (1, 2)]
-    assert "more than the start's noise" in sentences(one(*apart, *still))[1]
+    assert sentences(one(*apart, *still))[1] == (
+        "Starts moved by up to 0.1 mm move no end so far: the difference is more than the start's "
+        "noise."
+    )
     found = one(*apart, *still, end("b", 21.0, moved=1e-3))
     assert found.noise(("b", "headless", "tuned"), 1e-3) == pytest.approx(11.0)
     assert found.noise(("a", "headless", "tuned"), 1e-3) is None
@@ -66,22 +74,33 @@ def test_a_difference_that_a_moved_start_makes_too_is_noise() -> None:
         "scene's own noise, and no cause can be told from it."
     )
     third = one(*apart, *still, end("b", 21.0, moved=1e-3), end("c", 100.0))
-    assert "Of 3 pairs that differ, moved starts explain 1" in sentences(third)[1]
+    assert sentences(third)[1] == (
+        "Of 3 pairs that differ, moved starts explain 1; the others differ by more than starts "
+        "moved by up to 1 mm do."
+    )
 
 
 def test_without_moved_starts_or_finer_steps_nobody_knows() -> None:
     told = sentences(one(end("a", 0.0), end("b", 10.0)))
-    assert told[1].startswith("No moved start was tried")
-    assert told[2].startswith("No finer step was tried")
+    assert told[1:] == [
+        "No moved start was tried, so nobody knows whether this is more than noise.",
+        "No finer step was tried, so nobody knows whether an end is converged.",
+    ]
+    crashed = end("a", 0.0, 0.0005, status="failed", details={}, metrics={})
+    assert sentences(one(end("a", 0.0), end("b", 10.0), crashed))[2] == (
+        "With steps 4 times as fine no repetition finished."
+    )
+    moved = one(end("a", 0.0), end("a", 1.2, moved=6e-4))
+    assert sentences(moved) == ["bowl ran in a alone, so nothing is compared."]
 
 
 def test_a_finer_step_says_whether_the_difference_survives_and_who_is_not_converged() -> None:
     apart = [end("a", 0.0), end("b", 10.0), end("a", 0.1, 0.0005), end("b", 10.2, 0.0005)]
     found = one(*apart)
     assert found.change(("b", "headless", "tuned"), 4) == pytest.approx(0.2)
-    assert (
-        "they still end in 2 ways, up to 10 mm apart, where they ended before"
-        in sentences(found)[2]
+    assert sentences(found)[2] == (
+        "With steps 4 times as fine they still end in 2 ways, up to 10 mm apart, where they ended "
+        "before: the step is not to blame."
     )
     found = one(*apart, end("a", 0.1, 0.00025), end("b", 0.3, 0.00025))
     assert sentences(found)[2] == (
@@ -91,14 +110,19 @@ def test_a_finer_step_says_whether_the_difference_survives_and_who_is_not_conver
 
 
 def test_equal_ends_of_one_start_that_is_unstable_are_no_agreement() -> None:
-    found = one(end("a", 0.0), end("b", 0.5), end("a", 25.0, moved=1e-4))
-    assert sentences(found)[1].startswith("But a start moved by 0.1 mm moves an end by up to 25 mm")
+    tried = [end("a", 25.0, moved=1e-4), end("b", 3.0, moved=1e-4), end("a", 90.0, moved=1e-3)]
+    assert sentences(one(end("a", 0.0), end("b", 0.5), *tried)) == [
+        "As written, bowl ends alike in all 2, within 1 mm.",
+        "But a start moved by 0.1 mm moves an end by up to 25 mm: equal ends of one start are no "
+        "sign that the simulators agree.",
+    ]
 
 
 def test_a_crash_is_told_and_other_scenes_stay_apart() -> None:
     other = {"settings": {**end("a", 0).settings, "task.scene": "cup"}}
     records = [
-        end("c", 0.0, details={}), end("a", 0.0), end("b", 9.0), end("a", 0.0, moved=1e-3),
+        end("c", 0.0, details={}), end("a", 0.0), end("b", 9.0, metrics={}),
+        end("a", 1.26, moved=1e-3),
         end("a", 0.0, moved=1e-3, seed=2, status="failed", details={}, metrics={}),
         end("a", 3.0, **other), end("b", 3.0, **other),
     ]  # fmt: skip
@@ -106,8 +130,8 @@ def test_a_crash_is_told_and_other_scenes_stay_apart() -> None:
     assert (bowl.scene, cup.scene) == ("bowl", "cup")
     heads = [column.heading for column in section(bowl).tables[0].columns]
     assert heads == ["simulator", "as written", "moved by 1 mm", "CPU s/sim s"]
-    moved = section(bowl).tables[0].columns[2]
-    assert [cell.text for cell in moved.cells] == ["100 % 0 1 crashed", "-"]
+    told = [[cell.text for cell in one.cells] for one in section(bowl).tables[0].columns]
+    assert told[:3] == [["a", "b"], ["100 %", "ended"], ["100 % 1.3 1 crashed", "-"]]
     for key in ("task.scene", "task.scene_digest", "task.seconds", "task.starts"):
         other = {"settings": {**end("a", 0).settings, key: 3}}
         assert len(settlings([*records[1:3], *(end(who, 3.0, **other) for who in "ab")])) == 2

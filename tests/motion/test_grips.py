@@ -71,17 +71,24 @@ def test_a_tall_peg_is_grasped_under_its_top_and_a_flat_tile_above_the_ground() 
 
 
 def test_a_prism_is_grasped_at_its_faces_where_something_stands_opposite() -> None:
-    edge, height = 0.05, 0.05 * math.sqrt(3) / 2
-    triangle = [(0.0, 0.0), (edge, 0.0), (edge / 2, height)]
+    triangle = [(0.0, 0.0), (0.05, 0.0), (0.02, 0.04)]
     found = grips(PANDA, prism(*triangle))
     assert len(found) == 6  # an edge and the corner opposite, from both sides
-    assert [grip.width for grip in found] == pytest.approx([height] * 6)
+    for k in range(3):
+        corner, one, other = np.roll(triangle, k, axis=0)
+        edge = (other - one) / np.linalg.norm(other - one)
+        foot = one + edge * ((corner - one) @ edge)
+        across = [g for g in found if abs(g.tool.rotation()[:2, 1] @ edge) < 1e-9]
+        assert [g.width for g in across] == pytest.approx([np.linalg.norm(corner - foot)] * 2)
+        for grip in across:
+            assert grip.tool.position == pytest.approx([*(corner + foot) / 2, 0.02])
     hexagon = [(0.03 * math.cos(k), 0.03 * math.sin(k)) for k in np.arange(6) * math.pi / 3]
     assert {round(grip.width, 9) for grip in grips(PANDA, prism(*hexagon))} == {
         round(0.03 * math.sqrt(3), 9)
     }
     slanted = [(0.0, 0.0), (0.05, 0.0), (0.09, 0.03), (0.04, 0.03)]  # its short sides miss
-    assert {round(grip.width, 9) for grip in grips(PANDA, prism(*slanted))} == {0.03}
+    for grip in grips(PANDA, prism(*slanted)):
+        assert [grip.width, *grip.tool.position] == pytest.approx([0.03, 0.045, 0.015, 0.02])
 
 
 def test_what_no_hand_holds_is_refused_in_a_sentence() -> None:

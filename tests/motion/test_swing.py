@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pytest_simbench.cli.main import main
 from pytest_simbench.motion.collision import PlanningScene
@@ -16,8 +19,24 @@ from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import ARMS, find
-from pytest_simbench.motion.swing import LANDING, THROWN, found_swing
-from pytest_simbench.motion.throw import feasible_swing, released, swing_of
+from pytest_simbench.motion.swing import (
+    LANDING,
+    LOWEST,
+    THROWN,
+    _candidates,
+    _easiest,
+    _in_plane,
+    _speed,
+    found_swing,
+)
+from pytest_simbench.motion.throw import (
+    LANDING_HEIGHT,
+    SPEED_SHARE,
+    feasible_swing,
+    landing_x,
+    released,
+    swing_of,
+)
 from pytest_simbench.scene import STANDARD_GRAVITY, Pose, Robot, Scene, SceneError
 from tests.motion.small_arm import TOML, small_arm
 
@@ -64,6 +83,40 @@ def test_it_lands_elsewhere_if_asked_to() -> None:
     assert throw.landing(GRAVITY) == pytest.approx(1.2, abs=0.005)
 
 
+def test_candidates_throw_there_within_their_limits() -> None:
+    model, scale = RobotModel(find("ur5")), 0.9
+    limits = model.limits.column("velocity")
+    _, moving = _in_plane(model, 1.2)
+    found = list(islice(_candidates(model, GRAVITY, 1.2, scale), 3))
+    again = next(_candidates(model, GRAVITY, 1.2, scale))
+    assert (len(found), again.joints.tolist()) == (3, found[0].joints.tolist())
+    for share, joints, velocity in found:
+        tool, flight = model.tool_transform(joints), model.tool_velocity(joints, velocity)
+        position = tool.translation
+        landed = landing_x(position, flight, GRAVITY, LANDING_HEIGHT * scale)
+        assert landed == pytest.approx(1.2, abs=1e-5)
+        aside = position[1] + flight[1] * (1.2 - position[0]) / flight[0]
+        assert aside == pytest.approx(0.0, abs=1e-5)
+        assert flight @ tool.rotation[:, 2] >= -1e-9
+        assert position[2] >= LOWEST * scale
+        assert share == (np.abs(velocity) / limits).max() < SPEED_SHARE
+        assert np.flatnonzero(velocity).tolist() == moving
+
+
+def test_joints_share_a_velocity_by_their_limits() -> None:
+    """The second one alone makes the second part; shares 1 and 1 of the others make the first."""
+    ways, limits = np.array([[1.0, 0.0, 2.0], [0.0, -1.0, 0.0]]), np.array([1.0, 4.0, 3.0])
+    assert _easiest(ways, np.array([-7.0, 2.0]), limits) == pytest.approx([-1.0, -2.0, -3.0])
+    assert _easiest(0 * ways, np.array([-7.0, 2.0]), limits).tolist() == [np.inf] * 3
+
+
+@given(st.floats(0.2, 3.0), st.floats(0.1, 1.5), st.floats(0.0, 1.0))
+def test_a_flight_of_that_speed_goes_so_far(away: float, drop: float, elevation: float) -> None:
+    speed = _speed(away, drop, elevation, GRAVITY)
+    velocity = speed * np.array([np.cos(elevation), 0.0, np.sin(elevation)])
+    assert landing_x(np.array([0.0, 0.0, drop]), velocity, GRAVITY, 0.0) == pytest.approx(away)
+
+
 def test_too_far_is_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["swing", "ur5", "--landing=30"]) == 2
     said = "robot 'ur5' cannot throw to x = 30 m: no swing within its limits was found\n"
@@ -81,6 +134,8 @@ def test_a_file_may_have_a_swing(tmp_path: Path) -> None:
     told = "'small' has no swing for the throw: write one into its file, under [throw]"
     with pytest.raises(RobotError, match=re.escape(told)):
         swing_of(robot)
+    with pytest.raises(RobotError, match="arms whose first joint is upright and whose last one"):
+        _in_plane(RobotModel(robot), 1.2)
 
 
 def test_a_swing_has_a_number_for_each_joint() -> None:

@@ -150,6 +150,9 @@ def test_a_file_with_something_else_in_it(tmp_path: Path, wrong: dict[str, objec
 def test_what_is_commanded_is_the_end_of_each_motion() -> None:
     """And nothing where the world is left alone."""
     tape = [operation("wait", "a", 0.5), operation("follow", "b", 0.2, np.array([0.3]))]
-    found = Sample.of(episode({}, [motion([0.0], [0.0], [0.5])] * 3, tape), "sim", "t", 7)
+    motions = [motion([0.0], [0.0], [0.5])] * 3
+    found = Sample.of(episode({}, motions, tape), "sim", "t", 7)
+    assert found.motions is motions
+    assert Sample.of(episode({}, motions, tape[:1]), "sim", "t", 7).asked.tolist() == [[0.5]]
     assert np.array_equal(found.asked, [[0.5, np.nan], [0.2, 0.3]], equal_nan=True)
     assert (found.label, found.task, found.seed, found.bodies) == ("sim", "t", 7, ("a", "b"))

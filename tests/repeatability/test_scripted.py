@@ -67,6 +67,11 @@ def test_how_far_a_cube_goes_another_way() -> None:
     """Its displacement at the start does not count: 4 x - x."""
     for x in (0.001, -0.001):
         assert divergence(moved(0.0), moved(x)) == pytest.approx(0.003)
+    ways = [[(0.1, 0.5), (0.7, 0.9), (0.3, 0.4)], [(0.2, 0.6), (0.9, 0.7), (0.5, 0.45)]]
+    three, other = (
+        episode(ALL, [motion([k], [a], [b]) for k, (a, b) in enumerate(way)]) for way in ways
+    )
+    assert divergence(three, other) == pytest.approx(0.1)
     nobody = episode(ALL, [motion([0.0]), motion([1.0])])
     assert divergence(nobody, nobody) == 0.0
 

@@ -87,21 +87,33 @@ def test_only_failures_make_a_page_that_tells_unreadable_results_too(tmp_path: P
 def test_the_setup_tells_settings_versions_and_machines() -> None:
     records = [
         record(
-            repetition=k,
-            settings={"timestep": 0.002, "task.settle": 60.0},
+            seed=seed,
+            settings={"timestep": 0.002, "task.settle": 61.0},
             versions={"mujoco": "3.3"},
-            host={"cores": 2 + k},
+            host={"cores": cores, "cpu": "x"},
+            limits={"wall": 9.0, "memory": None, "cpu": cores},
         )
-        for k in (1, 2)
+        for seed, cores in ((1001, 3), (1003, 4), (1007, 3))
     ]
-    found = setup(summarise(records, METRICS))
-    assert found["tasks"] == {"stacking": {"settle": "60.0"}}
-    (simulator,) = found["simulators"]
-    assert simulator["settings"] == {"timestep": "0.002"}
-    assert simulator["versions"] == {"mujoco": "3.3"}
-    assert found["run"]["machine"] == "cores: 3; cores: 4"
-    assert found["run"]["seeds"] == "1001 to 1002 (2)"
-    assert found["run"]["protocol"] == "fast"
+    other = {"protocol": "slow", "jitter": 0.25, "deviations": ["no spin"]}
+    other |= {name: {} for name in ("settings", "versions", "host", "limits")}
+    found = setup(summarise([*records, record("bullet", seed=4, **other)], METRICS))
+    assert found["tasks"] == {"stacking": {"settle": "61.0"}}
+    both = (
+        ("bullet", {}, {}, ["no spin"]),
+        ("mujoco", {"timestep": "0.002"}, {"mujoco": "3.3"}, []),
+    )
+    assert found["simulators"] == [
+        {"label": f"{name} headless tuned", "of": (name, "headless", "tuned"),
+         "settings": settings, "versions": versions, "deviations": told}
+        for name, settings, versions, told in both
+    ]  # fmt: skip
+    assert found["run"] == {
+        "protocol": "slow; fast", "jitter": "0.25; 0", "seeds": "4 to 1007 (4)",
+        "limits": "wall 9.0, cpu 3; wall 9.0, cpu 4",
+        "machine": "cores: 3, cpu: x; cores: 4, cpu: x",
+    }  # fmt: skip
+    assert setup(summarise(records[:1], METRICS))["run"]["seeds"] == "1001"
 
 
 def test_the_command_runs_the_same_seed_again() -> None:
