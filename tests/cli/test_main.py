@@ -168,22 +168,17 @@ def test_a_broken_adapter_hides_no_other(monkeypatch: pytest.MonkeyPatch) -> Non
     assert (lines[3], lines[-1]) == ("    in /o", "")
 
 
-@pytest.mark.parametrize(
-    ("version", "environment", "told"),
-    [
-        ("3.4.0", None, "version 3.4.0, installed"),
-        ("0.0.1", None, "version 0.0.1, UNTESTED, installed"),
-        (None, "its own environment", "version not known, its own environment"),
-    ],
-)
-def test_a_simulator_s_place_is_told_with_its_version(
-    version: str | None, environment: str | None, told: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(simulators, "_version", lambda name: version)
-    monkeypatch.setattr(simulators.environments, "interpreter", lambda info: environment)
-    other = SimpleNamespace(place=environment or "half made")  # that one is not used
-    monkeypatch.setattr(simulators.environments, "outside", lambda info: other)
-    assert simulators._place("mujoco", {}) == told
+def test_a_simulator_s_place_is_told_with_its_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    def place(version: str | None, environment: str | None) -> str:
+        other = SimpleNamespace(place=environment or "half made")  # that one is not used
+        monkeypatch.setattr(simulators, "_version", lambda name: version)
+        monkeypatch.setattr(simulators.environments, "interpreter", lambda info: environment)
+        monkeypatch.setattr(simulators.environments, "outside", lambda info: other)
+        return simulators._place("mujoco", {})
+
+    assert place("3.4.0", None) == "version 3.4.0, installed"
+    assert place("0.0.1", None) == "version 0.0.1, UNTESTED, installed"
+    assert place(None, "there") == "version not known, there"
 
 
 def test_one_simulator_is_told_whole(capsys: pytest.CaptureFixture[str]) -> None:

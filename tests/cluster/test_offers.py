@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,8 +11,10 @@ import pytest
 from pytest_simbench.cluster import offers
 from pytest_simbench.cluster.offers import PLUGIN, PYTHON
 
-DRIVER = "/proc/driver/nvidia/version"
-OUTSIDE = {"pybullet": "2.5", "sapien": None}
+OUTSIDE = {
+    "pybullet": SimpleNamespace(version=lambda: "2.5"),
+    "sapien": SimpleNamespace(version=lambda: None),
+}
 """Engines with an environment of their own, and the version that it tells."""
 
 
@@ -23,64 +24,50 @@ def version(distribution: str) -> str:
     return "3.9"
 
 
-@pytest.fixture(autouse=True)
-def _a_bare_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+@pytest.fixture
+def bare(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> pytest.MonkeyPatch:
     """No device, and no simulator whose name begins with less than m."""
-
-    def outside(info: SimpleNamespace) -> SimpleNamespace | None:
-        own = info.name in OUTSIDE
-        return SimpleNamespace(version=lambda: OUTSIDE[info.name]) if own else None
-
     for name in ("DISPLAY", "WAYLAND_DISPLAY", "PATH"):
         monkeypatch.setenv(name, "")
     monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
     monkeypatch.setattr(offers, "missing", lambda info: None if info.name > "m" else "not here")
-    monkeypatch.setattr(offers, "outside", outside)
+    monkeypatch.setattr(offers, "outside", lambda info: OUTSIDE.get(info.name))
     monkeypatch.setattr(offers, "version", version)
-    monkeypatch.setattr(offers, "Path", lambda path: SimpleNamespace(exists=lambda: False))
-    monkeypatch.setattr(offers, "VULKAN_PROBE", "raise SystemExit(1)")
+    monkeypatch.setattr(offers, "Path", lambda path: tmp_path / path[1:])
+    monkeypatch.setattr(offers, "VULKAN_PROBE", "1/0")
+    return monkeypatch
 
 
-def offered(names: Iterable[str] | None = (), slots: int = 3) -> set[str]:
-    """What there is besides what every node offers; of each as much as it has slots."""
-    found = offers.here(slots, names)
-    assert {(type(amount), amount) for amount in found.values()} == {(float, slots)}
-    assert {"simbench", PLUGIN, PYTHON} <= {*found}
-    return {*found} - {"simbench", PLUGIN, PYTHON}
+def offered(*names: str) -> set[str]:
+    """What there is besides what every node offers."""
+    return {*offers.here(1, names)} - {"simbench", PLUGIN, PYTHON}
 
 
-def test_simulators_are_offered_by_name_and_version(tmp_path: Path) -> None:
+def test_simulators_are_offered_by_name_and_version(
+    bare: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     for name in ("mujoco==3.3.7", "drake==1.0", "mujoco", "nothing==1.0"):
         (tmp_path / name).mkdir()
-    assert offered(["drake", "pybullet", "sapien"], 2) == {"pybullet==2.5", "sapien==unknown"}
-    assert offered() == set()
-    found = {name for name in offered(None) if name.startswith(("d", "m", "nothing"))}
+    assert offered("drake", "pybullet", "sapien") == {"pybullet==2.5", "sapien==unknown"}
+    assert offers.here(3, []) == {"simbench": 3.0, PLUGIN: 3.0, PYTHON: 3.0}
+    found = {name for name in offers.here(1) if name.startswith(("drake", "mujoco", "nothing"))}
     assert found == {"mujoco==3.9", "mujoco==3.3.7==3.9"}
 
 
-@pytest.mark.parametrize("variable", ["DISPLAY", "WAYLAND_DISPLAY", "PATH"])
-def test_a_screen_and_xvfb_are_a_display(
-    variable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_devices_are_offered(
+    bare: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    """A display is a screen or Xvfb; a Vulkan device is what a probe finds, quietly and in time."""
     (tmp_path / "Xvfb").touch(mode=0o755)
-    monkeypatch.setenv(variable, str(tmp_path))
-    assert offered() == {"display"}
-
-
-def test_a_gpu_is_what_the_driver_tells_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(offers, "Path", lambda path: SimpleNamespace(exists=lambda: path == DRIVER))
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY", "PATH"):
+        assert offered() == set()
+        bare.setenv(variable, str(tmp_path))
+        assert offered() == {"display"}
+        bare.setenv(variable, "")
+    bare.setattr(offers, "VULKAN_PROBE", "print('found', flush=True)")
+    assert offered() == {"vulkan"}
+    bare.setattr(offers, "VULKAN_PROBE", "while True: pass")
+    bare.setattr(offers, "PROBE_TIMEOUT", 0.2)
+    (tmp_path / "proc" / "driver" / "nvidia" / "version").mkdir(parents=True)
     assert offered() == {"gpu"}
-
-
-@pytest.mark.parametrize(
-    ("probe", "timeout", "found"),
-    [("", 30.0, {"vulkan"}), ("1/0", 30.0, set()), ("while True: pass", 0.2, set())],
-)
-def test_a_vulkan_device_is_what_a_probe_finds_quietly_and_in_time(
-    probe: str, timeout: float, found: set[str], monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
-    monkeypatch.setattr(offers, "VULKAN_PROBE", f"print('seen', flush=True)\n{probe}")
-    monkeypatch.setattr(offers, "PROBE_TIMEOUT", timeout)
-    assert offered() == found
     assert capfd.readouterr() == ("", "")

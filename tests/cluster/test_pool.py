@@ -9,7 +9,6 @@ import time
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -218,52 +217,6 @@ def test_a_node_that_looks_for_its_head_ends_when_told(monkeypatch: pytest.Monke
     began = time.monotonic()
     assert main(["cluster", "node", "tcp://127.0.0.1:1", "--sim", "mujoco"]) == 0
     assert time.monotonic() - began < 20
-
-
-@pytest.mark.parametrize(
-    ("host", "address", "at"),
-    [(None, "127.0.0.1:9", "127.0.0.1"), ("h", "127.0.0.1:9", "h"), (None, "10.1.2.3:9", "me")],
-)
-def test_a_node_says_what_it_offers_and_tries_again(
-    host: str | None, address: str, at: str, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
-    """Its head is not there at first; then it ends the node, and then this process is told to."""
-    asked: list[tuple[Any, ...]] = []
-    told = asyncio.Event()
-
-    class Nanny:
-        worker_address = "tcp://w:1"
-
-        def __init__(self, *args: Any, **options: Any) -> None:
-            asked.append((*args, options))
-
-        async def __aenter__(self) -> Nanny:
-            if len(asked) == 1:
-                raise OSError("nobody")
-            return self
-
-        async def __aexit__(self, *_: object) -> None:
-            pass
-
-        async def finished(self) -> None:
-            if len(asked) == 3:
-                told.set()
-
-    monkeypatch.setattr("distributed.Nanny", Nanny)
-    monkeypatch.setattr("distributed.utils.get_ip", {"10.1.2.3": "me"}.__getitem__)
-    monkeypatch.setattr(serving, "_told", lambda: told)
-    monkeypatch.setattr(serving, "AGAIN", 0.01)
-    offers = {"simbench": 2.0, "mujoco==4.0": 2.0, "gpu": 2.0}
-    monkeypatch.setattr(serving, "here", lambda slots, names: offers if names == ["x"] else None)
-    asyncio.run(serving._node(f"tcp://{address}", host, "vm", 2, ["x"]))
-    options = {"name": "vm", "nthreads": 2, "resources": offers, "memory_limit": 0}
-    assert asked == [(f"tcp://{address}", {"host": at, **options, "dashboard": False})] * 3
-    again, served = "it tries again every 0.01 s", f"2 at once; it serves tcp://{address}"
-    assert capsys.readouterr().out.splitlines() == [
-        f"no head at tcp://{address} takes this node (nobody)", again,
-        f"vm has mujoco 4.0, gpu; {served}", again, f"vm has mujoco 4.0, gpu; {served}",
-    ]  # fmt: skip
 
 
 def test_a_node_whose_name_is_taken_is_told_to_take_another() -> None:
