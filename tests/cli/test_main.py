@@ -6,6 +6,7 @@ import subprocess
 import sys
 from fnmatch import fnmatchcase
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -149,6 +150,35 @@ def test_the_list_is_a_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert own
     for name in own:
         assert f"no: not here; simbench list {name} says how to get it\n" in out
+
+
+def test_a_broken_adapter_hides_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(simulators, "known", lambda: ["drake", "mujoco", "ode"])
+    monkeypatch.setattr(simulators, "problem", {"drake": "no class"}.get)
+    monkeypatch.setattr(simulators, "_version", {"ode": "0.16.6"}.get)
+    lines = [*simulators._table({"mujoco": "no"}.get)]
+    assert [" ".join(line.split()) for line in lines[1:]] == [
+        "drake - BROKEN: no class",
+        "mujoco - no: not here; simbench list mujoco says how to get it",
+        "ode 0.16.6 yes yes yes 2 ms",
+    ]
+    lines = [*simulators._paragraphs(["drake", "ode"], lambda name: None, {"ode": "/o"}, False)]
+    assert lines[:2] == ["drake: BROKEN: no class", ""]
+    assert lines[2].startswith("ode: ")
+    assert (lines[3], lines[-1]) == ("    in /o", "")
+
+
+def test_a_simulator_s_place_is_told_with_its_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    def place(version: str | None, environment: str | None) -> str:
+        other = SimpleNamespace(place=environment or "half made")  # that one is not used
+        monkeypatch.setattr(simulators, "_version", lambda name: version)
+        monkeypatch.setattr(simulators.environments, "interpreter", lambda info: environment)
+        monkeypatch.setattr(simulators.environments, "outside", lambda info: other)
+        return simulators._place("mujoco", {})
+
+    assert place("3.4.0", None) == "version 3.4.0, installed"
+    assert place("0.0.1", None) == "version 0.0.1, UNTESTED, installed"
+    assert place(None, "there") == "version not known, there"
 
 
 def test_one_simulator_is_told_whole(capsys: pytest.CaptureFixture[str]) -> None:

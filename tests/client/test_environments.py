@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from urllib.request import Request
 
 import pytest
@@ -74,6 +75,34 @@ def test_create(info: SimulatorInfo) -> None:
     assert interpreter(info) == str(environment.python)
     environment.create()  # over an old one
     assert environment.problem is None
+
+
+@pytest.mark.parametrize("program", ["/bin/uv", None])
+def test_what_makes_one(
+    info: SimulatorInfo, program: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With uv, which is told of pip's index, or with pip; what was there is lost."""
+    environment, ran, told = half_made(info), [], []
+    folder, python = environment.folder, str(environment.python)
+
+    def run(command: list[str], variables: dict[str, str], look: Any) -> None:
+        ran.append((" ".join(command), variables))
+        folder.mkdir(exist_ok=True)
+
+    monkeypatch.setattr(environments, "uv", lambda: program)
+    monkeypatch.setattr(environments, "_run", run)
+    monkeypatch.setattr(package_index, "pip_configuration", lambda: {"index-url": "a"})
+    environment.create(told.append)
+    here, pip = sys.executable, "-m pip install --quiet --disable-pip-version-check"
+    uv = f"/bin/uv pip install --quiet --python {python} --index-strategy unsafe-best-match"
+    commands = [f"{here} -P -m venv {folder}", f"{python} -P {pip} six==1.16.0"]
+    if program:
+        commands = [f"/bin/uv venv --quiet --python {here} {folder}", f"{uv} six==1.16.0"]
+    assert ran == [(command, {"UV_DEFAULT_INDEX": "a"} if program else {}) for command in commands]
+    assert {one.name: one.read_text() for one in folder.iterdir()} == {
+        MARKER: '{"requirements": ["six==1.16.0"]}\n'
+    }
+    assert told == ["\rsixth: 0 MB, 0 s \n"]
 
 
 def test_two_that_make_the_same_wait_for_each_other(info: SimulatorInfo) -> None:

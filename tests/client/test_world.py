@@ -204,7 +204,8 @@ def test_late_commands_are_the_same_commands_later(delay: int, parts: list[int])
             at = number + 1.0
         else:
             asked.append(wait(-part * TICK))
-        late += latency.late(asked[-1])
+        late += (sent := latency.late(asked[-1]))
+        assert {one.phase for one in sent} == {asked[-1].phase}
     wanted, got = heard(asked), heard(late)
     assert len(got) == len(wanted)
     shifted = np.concatenate([np.zeros(delay), wanted])[: len(wanted)]

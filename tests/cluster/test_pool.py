@@ -7,12 +7,14 @@ import socket
 import threading
 import time
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from pytest_simbench.cli.main import main
 from pytest_simbench.cluster import pool as module
+from pytest_simbench.cluster import serving
 from pytest_simbench.cluster.executor import ClusterExecutor
 from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node, here, refusal, unmet
 from pytest_simbench.cluster.pool import Pool
@@ -81,23 +83,52 @@ def test_what_nobody_has_or_in_several_versions_is_named_with_what_each_has() ->
         "no node of the cluster offers mujoco with a display: "
     )
     nodes = [lab("lab1", "mujoco==3.3.7"), lab("lab2", "mujoco==3.4.0"), lab("lab3")]
-    assert "3.3.7 (lab1), 3.4.0 (lab2)" in str(unmet(nodes, "mujoco", ["headless"]))
+    assert unmet(nodes, "mujoco", ["headless"]) == (
+        "the nodes of the cluster have several versions of mujoco: 3.3.7 (lab1), 3.4.0 (lab2); "
+        "their results do not belong together, so give the run nodes of one version"
+    )
+    none = "no node of the cluster offers"
+    assert unmet(nodes[2:], "mujoco==3.3.7", ["headless"]) == (
+        f"{none} mujoco==3.3.7: lab3 has no simulator; on one of them: "
+        "simbench install mujoco==3.3.7, and start it again"
+    )
+    nodes = [lab("lab1"), lab("lab2", "mujoco==3.3.7==3.3.7"), lab("lab3")]
+    assert unmet(nodes, "mujoco==3.3.7", ["headless", "gui"]) == (
+        f"{none} mujoco==3.3.7 with a display: lab1 has no simulator; lab2 has mujoco==3.3.7; "
+        "lab3 has no simulator"
+    )
 
 
 @pytest.mark.parametrize(
     ("stranger", "words"),
     [
-        (node("old", "simbench==0.0.1", PYTHON), "runs pytest-simbench 0.0.1, and this is"),
-        (node("old", PLUGIN, "python==2.7"), "runs Python 2.7, and this is"),
+        (node("old", "simbench==0.0", PYTHON), f"pytest-simbench 0.0, and this is {PLUGIN[10:]}"),
+        (node("old", PLUGIN, "python==2.7"), f"Python 2.7, and this is {PYTHON[8:]}"),
     ],
 )  # fmt: skip
 def test_other_versions_are_refused(stranger: Node, words: str) -> None:
-    told = refusal([lab("lab1"), stranger])
-    assert told.startswith(f"old {words}")
-    assert "install the same version" in told
+    told = refusal([stranger, lab("lab1"), replace(stranger, name="b")])
+    assert told == f"old runs {words}; b runs {words}; install the same version on both sides"
     assert not stranger.has("mujoco", "headless")
     assert not refusal([lab("lab1")])
-    assert "start one" in refusal([])
+    assert refusal([]) == "it has no node; start one: simbench cluster node ADDRESS"
+
+
+def test_a_head_and_a_node_that_are_told_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        serving, "_run", lambda serve, *told: [serve.func.__name__, serve.args, *told]
+    )
+    assert serving.head(None, None, None, False, True) == [
+        "_head", ("127.0.0.1", 8786, module.LOST_AFTER, False, True),
+        "the head cannot listen on 127.0.0.1:8786", "give another --host or --port",
+    ]  # fmt: skip
+    assert serving.head("h", 0, 2.5, True, False)[1] == ("h", 0, 2.5, True, False)
+    assert serving.node("tcp://h:1", None, None, None, None) == [
+        "_node", ("tcp://h:1", None, socket.gethostname(), 1, None),
+        "no node for a head at tcp://h:1", "look at its address",
+    ]  # fmt: skip
+    own = ("tcp://h:1", "here", "vm", 4, ["mujoco"])
+    assert serving.node(*own)[1] == own
 
 
 class Told(Pool):
@@ -161,6 +192,7 @@ def test_waiting_ends_when_the_run_does() -> None:
     [
         ("head --port {}", "127.0.0.1:{} ([Errno 98] Address already in use); give another --host"),
         ("head --tls", "tls:// needs certificates for the scheduler in Dask's configuration"),
+        ("node tls://h:1", "tls:// needs certificates for the worker in Dask's configuration"),
         ("node tcp://nosuch.invalid:1", "no node for a head at tcp://nosuch.invalid:1 ("),
     ],
 )
@@ -191,7 +223,9 @@ def test_a_node_whose_name_is_taken_is_told_to_take_another() -> None:
     for reason in ("Worker failed to start.", "Unexpected response: {'message': 'name taken, vm'}"):
         error = RuntimeError("Nanny failed to start.")
         error.__cause__ = RuntimeError(reason)
-        told = not_taken("tcp://head:8786", "vm", error)
-        assert told.endswith("that the name 'vm' is taken, give another --name")
+        assert not_taken("tcp://head:8786", "vm", error) == (
+            f"no head at tcp://head:8786 takes this node ({reason}); if Dask says above that the "
+            "name 'vm' is taken, give another --name"
+        )
     away = not_taken("tcp://head:8786", "vm", OSError("Timed out"))
     assert away == "no head at tcp://head:8786 takes this node (Timed out)"

@@ -55,6 +55,7 @@ def test_a_robot_whose_file_was_changed_is_another_one(tmp_path: Path) -> None:
     mesh.write_bytes(stl(0.2))
     os.utime(mesh, ns=(0, 1))
     assert describe_robot(before) != second
+    assert (second["name"], describe_robot(None)) == ("small", {})
 
 
 def test_the_version_is_chosen_once_whatever_becomes_of_the_case(case: Case) -> None:

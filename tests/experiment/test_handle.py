@@ -212,6 +212,8 @@ def test_this_machine_says_how_it_is_run(
     monkeypatch.setattr(example, "missing", lambda info: f"no {info.name} here")
     with pytest.raises(ExampleError, match="no mujoco here"):
         read_example(path, tmp_path)
+    for elsewhere in ({"python": "p"}, {"spec": "s"}):  # nothing is asked of this machine
+        assert read_example(changed(path, "schema", to=1), tmp_path, **elsewhere).tape == TAPE
 
 
 def test_one_of_the_same_test_and_name_is_replaced(
@@ -243,6 +245,7 @@ def test_a_built_in_robot_is_this_machine_s(case: Case, tmp_path: Path, robot: R
     found = read_example(path, tmp_path, python="p")
     assert found.scene.robot == robot
     assert [one.to_wire() for one in found.tape] == [one.to_wire() for one in tape]
+    assert {found.tape[1].arguments[name].shape for name in ARRAYS} == {(2, len(robot.joints))}
 
 
 def test_a_robot_of_unknown_files_needs_a_word(
@@ -283,18 +286,17 @@ BOX = cube("a", Pose.at(0.0, 0.0, 0.2), WHITE).to_wire()
 
 # Scenes and settings that are none: tests/scene/test_checks.py, tests/simulator/test_settings.py.
 BROKEN: list[tuple[tuple[Any, ...], Any]] = [
-    (("schema",), 3), (("schema",), "1"), (("case",), [1]), (("case", "simulator"), "nowhere"),
-    (("case", "simulator"), 3), (("case", "simulator"), EVIL), (("case", "mode"), "magic"),
-    (("case", "profile"), "best"), (("case", "changes"), {"timestep": "x"}),
-    (("case", "versions"), [1]), (("scene",), None), (("scene", "bodies"), [BOX] * 301),
-    (("scene", "bodies"), [BOX, BOX]), (("scene", "bodies"), [3]), (("scene", "gravity"), [0, 0]),
-    (("scene", "robot"), 3), (("scene", "robot"), {"name": "panda"}),
+    (("schema",), 0), (("schema",), 3), (("schema",), "1"), (("case",), [1]),
+    (("case", "simulator"), "nowhere"), (("case", "simulator"), 3), (("case", "simulator"), EVIL),
+    (("case", "mode"), "magic"), (("case", "profile"), "best"), (("case", "versions"), [1]),
+    (("case", "changes"), {"timestep": "x"}), (("scene",), None), (("scene", "bodies"), [3]),
+    (("scene", "bodies"), [BOX, BOX]), (("scene", "bodies"), [BOX] * 301), (("tape",), {}),
+    (("scene", "gravity"), [0, 0]), (("scene", "robot"), {"name": "panda"}), (("tape",), [3]),
     (("scene", "bodies", 0, "mass"), -1), (("scene", "bodies", 0, "name"), EVIL),
-    (("scene", "bodies", 0, "pose", "quaternion"), [0, 0, 0, 0]), (("tape",), {}), (("tape",), [3]),
-    (("tape", 0, "kind"), "exec"), (("tape", 0, "phase"), None),
+    (("scene", "bodies", 0, "pose", "quaternion"), [0, 0, 0, 0]), (("tape", 0, "kind"), "exec"),
+    (("tape", 0, "phase"), None), (("tape", 0, "arguments"), {"duration": True}),
     (("tape", 0, "arguments"), {"duration": -1}), (("tape", 0, "arguments"), {"duration": 1e9}),
-    (("tape", 0, "arguments"), {"duration": True}),
-    (("tape", 0, "arguments"), {"duration": 1, "op": "close"}),
+    (("tape", 0, "arguments"), {"duration": 1, "op": "close"}), (("scene", "robot"), 3),
     (("tape", 0, "arguments"), {"duration": 1, "striking": 1}),
     (("tape", 0), {"kind": "follow", "arguments": FOLLOW, "phase": ""}),
 ]  # fmt: skip

@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -22,6 +23,7 @@ from gymnasium.utils.env_checker import check_env
 
 import pytest_simbench
 from pytest_simbench.cli.values import BadInput
+from pytest_simbench.client.closed_loop import Looking
 from pytest_simbench.client.environments import missing
 from pytest_simbench.client.errors import Unavailable
 from pytest_simbench.gym import IDS, making
@@ -36,6 +38,8 @@ from pytest_simbench.tasks.base import Jitter
 from pytest_simbench.tasks.goals import PushingToGoal, Reaching
 from tests.conftest import ADAPTERS, able_to, workers
 
+REAL = np.dtype("float64")
+HOW = "headless", "tuned", "p", "pushing_to_goal"
 SHORT = {"seconds": 0.4}
 
 
@@ -230,24 +234,43 @@ def test_several_at_once_are_as_one_after_the_other() -> None:
 def test_what_an_action_commands_and_a_place_is_worth() -> None:
     """In a tenth of a second, and in a twentieth; none of it needs a worker."""
     places, goal = [[0.02, 0.0, 0.0], [0.0, 0.021, 0.0]], np.zeros(3)
-    env = make("pushing", "mujoco", jitter=0.5, reward="sparse", robot=panda())
+    env = make("pushing", "mujoco", jitter=0.5, reward="sparse", robot=panda(), python="p")
     assert [box.shape for _, box in sorted(env.observation_space.items())] == [(3,), (3,), (51,)]
+    assert {box.dtype for box in (env.action_space, *env.observation_space.values())} == {REAL}
     assert env._jitter == Jitter(0.0005, np.radians(0.5))
     found = env._command(checked([2.0, 0.0, -2.0, 0.5, 0.5], env.action_space))
     assert found.tool_change == pytest.approx((0.05, 0.0, -0.05, 0.0, 0.0, 0.075))
     assert (found.gripper, found.position) == (pytest.approx(0.75 * 0.07), None)
     assert env.compute_reward(places, goal, {}).tolist() == [0.0, -1.0]
-    assert (env._handle.case.mode, env._handle.case.profile) == ("headless", "tuned")
+    case = env._handle.case
+    assert (case.mode, case.profile, case.python, case.test) == HOW
     assert env.metadata == {"render_modes": ["rgb_array"], "render_fps": 10.0}
+    assert (env.render_mode, env._looking) == (None, Looking())
+    env.task = SimpleNamespace(tolerance=0.026, scale=0.8)  # of a smaller arm, 0.0208 m
+    assert env.compute_reward(places, goal, {}).tolist() == [0.0, -1.0]
+    env = make("pushing", "mujoco", render_mode="rgb_array")
+    assert (env.render_mode, env._looking) == ("rgb_array", Looking(picture=(480, 480)))
     assert make_vec("pushing", "mujoco", 2).num_envs == 2
     delays = {"command_latency": 0.05, "observation_delay": 0.1}
     env = make("reaching", "mujoco", actions="joints", seconds=1.0, rate=20.0, **delays)
     assert (env._jitter, env.rhythm) == (Jitter(), Rhythm(20.0, 0.05, 0.1))
     assert env.compute_reward(places, goal, {}).tolist() == [-0.02, -0.021]
     env._position = np.array([0.0, 1.75, *panda().column("initial_position")[2:]])
-    found = env._command(checked([-1.0, 1.0, *np.zeros(5), -1.0], env.action_space))
-    assert found.position[:3] == pytest.approx([-0.05, 1.7628, 0.0])  # the end of its range
+    env._position[3] = -3.06
+    found = env._command(checked([-1, 1, 0, -1, 0, 0, 0, -1], env.action_space))
+    wanted = [-0.05, 1.7628, 0.0, -3.0718]  # the ends of two ranges
+    assert found.position[:4] == pytest.approx(wanted)
     assert (found.gripper, found.tool_change) == (0.0, None)
+
+
+def test_what_is_asked_too_early_is_refused() -> None:
+    env = make("pushing", "mujoco", python="p")
+    with pytest.raises(ResetNeeded, match=r"^no episode is under way: call reset\(\)$"):
+        env.step(np.zeros(5))
+    told = "^make the environment with render_mode='rgb_array' for pictures$"
+    with pytest.raises(UnsupportedMode, match=told):
+        env.render()
+    env.close()  # nothing to close
 
 
 @pytest.mark.parametrize(

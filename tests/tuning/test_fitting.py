@@ -4,7 +4,7 @@ tell."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +13,7 @@ import pytest
 
 from pytest_simbench.scene import FloatArray, Start, Trajectory
 from pytest_simbench.tasks import Fitting, Log
-from pytest_simbench.tuning.fitting import Fit
+from pytest_simbench.tuning.fitting import Fit, State
 from pytest_simbench.tuning.target import TuningError
 from pytest_simbench.tuning.telling import Told, told
 from pytest_simbench.tuning.unknowns import changed, unknowns
@@ -44,7 +44,7 @@ def swing(of: Mapping[str, float], start: float) -> FloatArray:
 
 def fit(
     sought: list[str], seed: int = 1, motion: Swing = swing, noise: float | None = NOISE,
-    scene_truth: Mapping[str, float] = TRUTH,
+    scene_truth: Mapping[str, float] = TRUTH, failures: Iterator[Any] | None = None,
 ) -> tuple[dict[str, Told], Fit]:  # fmt: skip
     """Of a log with noise, which begins at 0.2 m."""
     rng = np.random.default_rng(seed)
@@ -61,7 +61,12 @@ def fit(
         values = {name: getattr(slider, name.partition(":")[0]) for name in TRUTH}
         off = motion(values, slider.initial_position) - measured
         details = {"residuals": {"slider": off[:, None].tolist()}}
-        return SimpleNamespace(ok=np.isfinite(off).all(), details=details, metrics={}, error=None)
+        return SimpleNamespace(
+            ok=np.isfinite(off).all(),
+            details=details,
+            metrics={},
+            error=next(failures or iter(()), None),
+        )
 
     texts = [f"{name}={RANGES[name]}" for name in sought]
     one = Fit(scene, log, unknowns(texts, scene, log), noise, run)
@@ -176,9 +181,40 @@ def test_a_log_that_is_too_short_is_told(monkeypatch: pytest.MonkeyPatch) -> Non
         fit([*TRUTH], noise=None)
 
 
-def test_a_scene_that_cannot_be_simulated_is_told() -> None:
+def test_a_scene_that_cannot_be_simulated_is_told_with_the_first_reason() -> None:
     def none(of: Mapping[str, float], start: float) -> FloatArray:
         return swing(of, start) * (1.0 if of is TRUTH else math.nan)
 
-    with pytest.raises(TuningError, match="no value can be run: all fail"):
+    with pytest.raises(TuningError, match="^no value can be run: all fail$"):
         fit(["spring:slider"], motion=none)
+    failures = iter(SimpleNamespace(message=299 * letter + "?!") for letter in "abcde")
+    with pytest.raises(TuningError, match=rf"^no value can be run: {299 * 'a'}\?$"):
+        fit(["spring:slider"], motion=none, failures=failures)
+
+
+class Known(Fit):
+    """Of two unknowns, of which it is known how far each joint is off; it keeps where it looked."""
+
+    def __post_init__(self) -> None:
+        self.low, self.high = np.array([-9.0, -2.0]), np.array([9.0, 3.0])
+        self.seen: list[float] = []
+
+    def _look(self, point: FloatArray) -> State | None:
+        self.seen.append(point[1])
+        return State(point, {"slider": self.run(*point)}, None)
+
+
+@pytest.mark.parametrize(
+    ("edge", "half", "tried"),
+    [(0.1, 0.2, [0.4]), (0.7, 2.4, [0.4, -1.4]), (9, np.inf, [0.4, -1.4])],
+)
+def test_an_interval_is_tried_out_towards_the_farther_end(
+    edge: float, half: float, tried: list[float]
+) -> None:
+    """At three times its half, then four times as far, within the range."""
+    one = Known(SCENE, None, [], NOISE, lambda x, y: np.full(2, NOISE * (1 + 2e4 * (1 - y > edge))))
+    assert one.widened(one._look(np.array([0.0, 1.0])), 1, 0.2) == pytest.approx(half)
+    assert one.seen[1:] == pytest.approx(tried)
+    columns = {"a": np.array([3e-3, 4e-3]), "b": np.array([[5e-4]]), "c": np.full(3, 1.5e-3)}
+    assert one.misfit(columns) == pytest.approx({"a": math.sqrt(12.5)})
+    assert [one._inside(1, x) for x in (-2.01, -2, 3, 3.01)] == [False, True, True, False]

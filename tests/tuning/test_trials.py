@@ -12,7 +12,8 @@ import pytest
 from pytest_simbench.client.errors import SceneRefused, Where
 from pytest_simbench.records.record import Failure
 from pytest_simbench.scene.policy import LoopError
-from pytest_simbench.tuning.target import TuningError
+from pytest_simbench.tuning.target import FIRST_CHOSEN, FIRST_JUDGED, TuningError
+from pytest_simbench.tuning.trials import Candidate
 
 from .made_up import target, trials
 
@@ -25,6 +26,23 @@ def test_cost_and_error_are_those_of_the_records(tmp_path: Path) -> None:
     assert executor.asked == [("today", k) for k in (1, 2, 3, 4)]
     seeds = [(r.seed, r.settings["timestep"]) for r in looks.runs.folder.own]
     assert seeds[0] == (300_001, 0.002)
+
+
+@pytest.mark.parametrize(
+    ("name", "half", "seed", "timeout"),
+    [("today", "", FIRST_CHOSEN, 7.0), ("converged", "held_out", FIRST_JUDGED, 7.0),
+     ("trial1", "", FIRST_CHOSEN, 45.0), ("trial1", "held_out", FIRST_JUDGED, 45.0)],
+)  # fmt: skip
+def test_how_a_candidate_is_run(
+    tmp_path: Path, name: str, half: str, seed: int, timeout: float
+) -> None:
+    looks, _ = trials(tmp_path, lambda s, k: 1.0)
+    looks.case = replace(looks.case, timeout=7.0, changes={"timestep": 0.001, "iterations": 9})
+    looks.timeout, variant = 45.0, f"{name}-{half}" if half else name
+    assert looks._case(Candidate(name, {"timestep": 0.004}, half)) == replace(
+        looks.case, test=f"tune_falling[mujoco-headless-{variant}]", function="tune_falling",
+        variant=variant, changes={"timestep": 0.004, "iterations": 9}, seed=seed, timeout=timeout,
+    )  # fmt: skip
 
 
 def test_a_hopeless_candidate_is_stopped(tmp_path: Path) -> None:

@@ -1,0 +1,73 @@
+"""What a machine offers to a cluster, by what it has."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from pytest_simbench.cluster import offers
+from pytest_simbench.cluster.offers import PLUGIN, PYTHON
+
+OUTSIDE = {
+    "pybullet": SimpleNamespace(version=lambda: "2.5"),
+    "sapien": SimpleNamespace(version=lambda: None),
+}
+"""Engines with an environment of their own, and the version that it tells."""
+
+
+def version(distribution: str) -> str:
+    if distribution != "mujoco":
+        raise PackageNotFoundError
+    return "3.9"
+
+
+@pytest.fixture
+def bare(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> pytest.MonkeyPatch:
+    """No device, and no simulator whose name begins with less than m."""
+    for name in ("DISPLAY", "WAYLAND_DISPLAY", "PATH"):
+        monkeypatch.setenv(name, "")
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(tmp_path))
+    monkeypatch.setattr(offers, "missing", lambda info: None if info.name > "m" else "not here")
+    monkeypatch.setattr(offers, "outside", lambda info: OUTSIDE.get(info.name))
+    monkeypatch.setattr(offers, "version", version)
+    monkeypatch.setattr(offers, "Path", lambda path: tmp_path / path[1:])
+    monkeypatch.setattr(offers, "VULKAN_PROBE", "1/0")
+    return monkeypatch
+
+
+def offered(*names: str) -> set[str]:
+    """What there is besides what every node offers."""
+    return {*offers.here(1, names)} - {"simbench", PLUGIN, PYTHON}
+
+
+def test_simulators_are_offered_by_name_and_version(
+    bare: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for name in ("mujoco==3.3.7", "drake==1.0", "mujoco", "nothing==1.0"):
+        (tmp_path / name).mkdir()
+    assert offered("drake", "pybullet", "sapien") == {"pybullet==2.5", "sapien==unknown"}
+    assert offers.here(3, []) == {"simbench": 3.0, PLUGIN: 3.0, PYTHON: 3.0}
+    found = {name for name in offers.here(1) if name.startswith(("drake", "mujoco", "nothing"))}
+    assert found == {"mujoco==3.9", "mujoco==3.3.7==3.9"}
+
+
+def test_devices_are_offered(
+    bare: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A display is a screen or Xvfb; a Vulkan device is what a probe finds, quietly and in time."""
+    (tmp_path / "Xvfb").touch(mode=0o755)
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY", "PATH"):
+        assert offered() == set()
+        bare.setenv(variable, str(tmp_path))
+        assert offered() == {"display"}
+        bare.setenv(variable, "")
+    bare.setattr(offers, "VULKAN_PROBE", "print('found', flush=True)")
+    assert offered() == {"vulkan"}
+    bare.setattr(offers, "VULKAN_PROBE", "while True: pass")
+    bare.setattr(offers, "PROBE_TIMEOUT", 0.2)
+    (tmp_path / "proc" / "driver" / "nvidia" / "version").mkdir(parents=True)
+    assert offered() == {"gpu"}
+    assert capfd.readouterr() == ("", "")
