@@ -139,6 +139,15 @@ def test_what_joins_links_and_joints_and_cannot() -> None:
             kind(*values)
 
 
+def test_the_last_that_can_be() -> None:
+    made = replace(BOX, name="x" * 100, mass=1e6, friction=0.0, restitution=1.0)
+    assert (len(made.name), made.mass) == (100, 1e6)
+    replace(BOX, pose=Pose(quaternion=(0.9991, 0.0, 0.0, 0.0)))
+    for length in (0.9989, 1.0011):
+        with pytest.raises(SceneError, match=r"has the length .*; it must be 1 \(w, x, y, z\)"):
+            replace(BOX, pose=Pose(quaternion=(0.0, length, 0.0, 0.0)))
+
+
 def test_numbers_of_numpy_are_numbers() -> None:
     size = tuple(np.array([0.1, 0.2, 0.3]))
     assert replace(BOX, size=size, mass=np.float32(1), friction=np.int64(1)).size == size

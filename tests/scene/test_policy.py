@@ -47,7 +47,10 @@ def test_another_is_refused(rhythm: Rhythm, told: str) -> None:
         rhythm.steps(1 / 240)
 
 
-@pytest.mark.parametrize("given", [{"rate": 0.0}, {"rate": math.nan}, {"command_latency": -1.0}])
+@pytest.mark.parametrize(
+    "given",
+    [{"rate": 0.0}, {"rate": math.nan}, {"command_latency": -1.0}, {"observation_delay": -1.0}],
+)
 def test_so_is_what_is_no_rhythm(given: dict[str, float]) -> None:
     with pytest.raises(LoopError):
         Rhythm(**{"rate": 10.0, **given})
@@ -183,6 +186,9 @@ def test_without_a_model_the_tool_is_refused() -> None:
     for answer in (Command(tool_change=np.zeros(6)), Command(tool=Pose())):
         with pytest.raises(PolicyError, match="inside the worker"):
             points(None).after(answer)
+    seen = Sight(SCENE).seen(0.0, np.zeros((2, 9)), np.zeros((3, 9)), np.zeros((1, 13)))
+    with pytest.raises(PolicyError, match="a policy does not see the pose of the tool"):
+        _ = seen.tool
 
 
 def test_what_is_seen() -> None:
