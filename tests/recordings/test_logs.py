@@ -35,7 +35,7 @@ def npz(folder: Path, **arrays: Any) -> Path:
 
 
 def table(folder: Path, text: str) -> Path:
-    (folder / "log.csv").write_text(text)
+    (folder / "log.csv").write_text(text, errors="surrogateescape")
     return folder / "log.csv"
 
 
@@ -181,6 +181,7 @@ def test_what_cannot_be_is_one_sentence(tmp_path: Path, arrays: Any, why: str) -
         ("time,time\n0,0\n", "two columns of one name"),
         ("time,hinge\n0,0\n1,nan\n", "no finite number of 'hinge' in row 1"),
         ("", "no column 'time'"),
+        ("\udcff,hinge\n0,0\n", "no column 'time'"),
     ],
 )
 def test_a_table_that_cannot_be_is_told_with_its_line(tmp_path: Path, text: str, why: str) -> None:

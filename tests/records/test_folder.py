@@ -24,6 +24,8 @@ from .build import failed, record
 
 def test_what_holds_a_run(tmp_path: Path) -> None:
     assert not RunFolder(tmp_path / "nowhere").holds_run
+    (told,) = RunFolder(tmp_path / "nowhere").scan().refused
+    assert told.endswith(" (No such file or directory); give a run folder or its records.jsonl")
     (tmp_path / "records.jsonl").touch()
     (tmp_path / "other.txt").write_text("x")
     assert not RunFolder(tmp_path).holds_run
@@ -249,7 +251,11 @@ def test_a_lost_folder_is_read_from_memory(tmp_path: Path) -> None:
     assert [r.repetition for r in found.records] == [1]
     assert found.tasks == {"pouring": POURING}
     told = folder.close()
-    assert len(told) == 2
+    why = f"(File exists); they are in {Path(told[0].rpartition(' ')[2]).parent}"
+    assert told == tuple(
+        f"1 {noun} could not be written to {tmp_path / 'run' / name} {why}/{name}"
+        for noun, name in (("record", RECORDS), ("task description", TASKS))
+    )
     (spare,) = {Path(text.rpartition(" ")[2]).parent for text in told}
     again = RunFolder(spare).read()
     assert (again.records, again.tasks) == (found.records, found.tasks)
