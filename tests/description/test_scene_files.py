@@ -107,17 +107,9 @@ def test_what_is_included_in_a_replicate_counts_as_often(
         )
         with pytest.raises(DescriptionError, match="more than 3") if refused else nullcontext():
             check_mjcf(str(tmp_path / "a.xml"))
-
-
-def test_no_more_is_included_than_five_times_the_geoms(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(mjcf_check.MOST, "geom", 2)
-    (tmp_path / "b.xml").write_text("<inside/>")
-    for more, refused in (8, False), (9, True):  # and <mujoco> and <include>
-        (tmp_path / "a.xml").write_text(f'<mujoco>{more * "<a/>"}<include file="b.xml"/></mujoco>')
-        with pytest.raises(DescriptionError, match="too much") if refused else nullcontext():
-            check_mjcf(str(tmp_path / "a.xml"))
+    monkeypatch.setitem(mjcf_check.MOST, "geom", 0)
+    with pytest.raises(DescriptionError, match="a.xml, line 1: too much is included"):
+        check_mjcf(str(tmp_path / "a.xml"))
 
 
 def test_a_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
@@ -150,13 +142,7 @@ def test_files_beside_are_read_but_a_whole_home_is_no_room(
         check_mjcf(str(scene))
 
 
-@pytest.mark.parametrize(
-    "folders",
-    [
-        'meshdir="meshes"', 'assetdir="meshes"', 'meshdir="meshes" assetdir="none"',
-        'assetdir="meshes" texturedir="none"',
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("folders", ['meshdir="meshes" assetdir="none"', 'assetdir="meshes"'])
 def test_a_good_file_passes(tmp_path: Path, folders: str) -> None:
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "m.stl").write_text("")

@@ -9,16 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pytest_simbench.ground.errors import NotSupportedError
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Pose, Scene, SceneError
-from pytest_simbench.simulator import (
-    NotSupportedError,
-    Seen,
-    Simulator,
-    chosen_on,
-    heavy,
-    lazy_import,
-)
+from pytest_simbench.simulator import Seen, Simulator, chosen_on, heavy, lazy_import
 from pytest_simbench.simulator.base import EYE, LOOK_AT, view_axes
 from tests.approval import assert_approved_message
 from tests.worker.hosted import Toy
