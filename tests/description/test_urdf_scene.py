@@ -109,7 +109,7 @@ def test_of_everything_it_is_told_what_became_of_it(tmp_path: Path) -> None:
     for name, changes in (
         ("cabinet", [knob]),
         ("cabinet-follows", [follow, plain]),
-        ("cabinet-coupled", [coupled, away]),
+        ("cabinet-coupled", [coupled, away, ('robot name="cabinet"', "robot")]),
     ):
         account = read(tmp_path, *changes).account
         assert_approved(name, "\n".join(" | ".join(line.to_wire().values()) for line in account))

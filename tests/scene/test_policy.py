@@ -171,6 +171,8 @@ def test_motors_take_efforts_alone() -> None:
     assert at.effort.tolist() == [2.0] * 9
     at.after(Command(effort=np.arange(7.0)))
     assert at.effort.tolist() == [*range(7), 0.0, 0.0]
+    at.after(Command(gripper=0.03))  # without a model of the hand each finger goes half the way
+    assert at.position[7:].tolist() == [0.015, 0.015]
 
 
 def test_a_robot_without_a_hand_is_moved_by_all_its_joints() -> None:
