@@ -36,6 +36,9 @@ def test_a_truncated_line_is_reported_and_the_next_record_starts_its_own(tmp_pat
     reading = RunFolder.of(path).read()
     assert [item.repetition for item in reading.records] == [0, 2]
     assert len(reading.problems) == 1
+    path.write_bytes(b"{")  # not more than that was written
+    RunFolder(path.parent).append(record(3))
+    assert [item.repetition for item in RunFolder.of(path).read().records] == [3]
 
 
 def test_a_full_disk_keeps_the_records_and_moves_them_elsewhere(tmp_path: Path) -> None:
