@@ -58,6 +58,9 @@ def test_a_fixed_body_does_not_start_to_move_and_takes_no_force() -> None:
         Box("post", (1.0, 1.0, 1.0), Pose(), angular_velocity=(0.0, 0.0, 1.0))
     with pytest.raises(SceneError, match="'post' has no mass, so no force moves it"):
         Box("post", (1.0, 1.0, 1.0), Pose(), wrenches=(PULL,))
+    for more in ({"mass": 1.0}, {"linear_damping": 0.1}):
+        with pytest.raises(SceneError, match="'unit' moves as prescribed, so it has no mass and"):
+            UNIT.changed(prescribed=True, **more)
 
 
 R, L = 0.3, 0.8
