@@ -164,8 +164,10 @@ def cylinder_hull(radius: float, half: float) -> tuple[FloatArray, float]:
 def capsule_hull(radius: float, half: float = 0.0) -> tuple[FloatArray, float]:
     """The same of a capsule, `half` the length between its ends' middles; 0: a sphere."""
     ways = directions(MOST)
-    gap = radius * (1 - float((directions(400) @ ways.T).max(axis=1).min()))
-    return radius * ways + np.array([0.0, 0.0, half]) * np.sign(ways[:, 2:]), gap
+    points = radius * ways + np.array([0.0, 0.0, half]) * np.sign(ways[:, 2:])
+    hull = Polytope(points)  # farthest from the capsule across the middles of its faces
+    away = (hull.normals * points[[face[0] for face in hull.faces]]).sum(axis=1)
+    return points, float((radius + half * np.abs(hull.normals[:, 2]) - away).max())
 
 
 def directions(count: int) -> FloatArray:

@@ -156,8 +156,8 @@ class Trace:
         count = len([name for name in arrays if name.startswith("faces_")])
         meshes = [Mesh(arrays[f"vertices_{k}"], arrays[f"faces_{k}"]) for k in range(count)]
         for mesh in meshes:
-            _like(mesh.vertices, (None, 3), "a mesh's vertices")
-            _like(mesh.faces, (None, 3), "a mesh's faces")
+            _like(mesh.vertices, (None, 3), "meshes' vertices")
+            _like(mesh.faces, (None, 3), "meshes' faces")
             if not np.issubdtype(mesh.faces.dtype, np.integer) or (
                 len(mesh.faces)
                 and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices)

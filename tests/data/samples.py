@@ -20,7 +20,9 @@ from pytest_simbench.data.torch_file import MAGIC, VERSION
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray
 
 
-def torch_file(array: FloatArray, kind: str = "Double", order: Literal["C", "F"] = "C") -> bytes:
+def torch_file(
+    array: FloatArray, kind: str = "Double", order: Literal["C", "F", "A"] = "C"
+) -> bytes:
     """As `torch.save` wrote a tensor before torch 1.6."""
     fakes = {name: types.ModuleType(name) for name in ("torch", "torch._utils")}
     storage = type(f"{kind}Storage", (), {"__module__": "torch"})

@@ -43,7 +43,14 @@ def test_a_set_is_brought_checked_and_read(source: Local, tmp_path: Path) -> Non
     assert [toss.index for toss in found.items] == [0, 1, 10]
     for toss in found.items:
         assert np.allclose(toss.state, falling(10 + toss.index), rtol=0, atol=1e-15)
-    assert "BSD-3-Clause" in told[0]
+    size = sum(map(len, FILES.values())) / 1e6
+    assert told == [
+        "cube_tosses: from github.com/DAIRLab/contact-nets, BSD-3-Clause",
+        f"cube_tosses: 3 files, {size:.0f} MB, kept",
+    ]
+    (tmp_path / "file").touch()
+    with pytest.raises(DataError, match="cube_tosses cannot be kept in .*/file: File exists"):
+        download(source, tmp_path / "file", told.append)
 
 
 def test_other_content_is_refused_and_not_kept(source: Local, tmp_path: Path) -> None:

@@ -58,6 +58,14 @@ def test_what_is_no_clean_impact_of_one_corner_is_left_out() -> None:
         assert len(clean_impacts(1, toss(at=at, rows=rows))) == many
 
 
+@pytest.mark.parametrize("way", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1 / SCALE[2])])
+@pytest.mark.parametrize(("kick", "order"), [(0.39, 0), (-0.39, 0), (0.41, 1), (-0.41, 1)])
+def test_an_earlier_impact_is_one_from_a_kick_on(way: Any, kick: float, order: int) -> None:
+    rows = toss()
+    rows[:5] += np.outer((np.arange(5) - 5) / impacts.RATE, kick * np.array(way))
+    assert [found.order for found in clean_impacts(1, rows)] == [order]
+
+
 def test_the_lowest_corner_is_the_lowest_of_four() -> None:
     for angle in np.linspace(-7.1, 7.0, 29):
         around = angle + np.pi / 4 + np.arange(4) * np.pi / 2
@@ -76,7 +84,8 @@ def test_flight_goes_back_and_on_from_the_impact() -> None:
 
 
 def arrays() -> dict[str, Any]:
-    state = np.concatenate([np.stack([toss(), toss()]), np.zeros((2, 40, 3))], axis=2)
+    rows = toss(impacts.FLIGHT - 0.7, rows=2 * impacts.FLIGHT)
+    state = np.concatenate([np.stack([rows, rows]), np.zeros((2, len(rows), 3))], axis=2)
     return {"number": np.array([3, 2]), "state": state}
 
 
@@ -99,7 +108,7 @@ def test_a_file_is_read_and_halves_are_of_even_and_odd_tosses(tmp_path: Path, na
         (lambda found: found.pop("state"), "the array 'state' is missing"),
         (edited("number", np.array([1, 1])), "whole numbers, each once"),
         (edited("state", np.zeros((2, 40, 5))), r"the shape \(2, 40, 5\), not \(2, rows, 6\)"),
-        (edited("state", np.zeros((2, 12, 6))), "too few rows"),
+        (edited("state", np.zeros((2, 19, 6))), "too few rows"),
         (edited("state", np.full((2, 40, 6), np.nan)), "too large or no numbers"),
     ],
 )

@@ -74,8 +74,13 @@ def test_a_folder_without_runs_is_none(tmp_path: Path) -> None:
         (lambda a: a.pop("CubeExp0001/cube"), "the array 'CubeExp0001/cube' is missing"),
         (lambda a: a.update({"runs": np.array(["Cube"])}), "'Cube' has no number of four digits"),
         (lambda a: a.update({"CubeExp0001/hand": poses(29, 0)}), "arrays that do not fit"),
+        (lambda a: a.update({"CubeExp0001/cube": poses(31, 0)}), "arrays that do not fit"),
+        (lambda a: a.update({"CubeExp0001/time": np.zeros((30, 1))}), "arrays that do not fit"),
         (lambda a: a["CubeExp0001/hand"].fill(np.nan), "values that are no numbers"),
-        (lambda a: a["CubeExp0001/hand"].fill(0.0), "no rotations"),
+        (lambda a: a["CubeExp0001/cube"].fill(np.inf), "values that are no numbers"),
+        (lambda a: a.update({"CubeExp0001/time": np.arange(30)}), "values that are no numbers"),
+        (lambda a: a["CubeExp0001/time"].__setitem__(7, 0.06), "time that stands still"),
+        (lambda a: a["CubeExp0001/hand"].fill(0.0), "no rotations, or time"),
     ],
 )
 def test_arrays_that_are_no_runs_are_one_sentence(

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import as_strided
 
 from pytest_simbench.data import DataError, Toss, Tosses, tosses
 from pytest_simbench.data.torch_file import MAGIC, VERSION, read_tensor
@@ -92,7 +93,30 @@ ROWS = np.arange(24.0).reshape(1, 4, 6)
 
 @pytest.mark.parametrize(("kind", "order"), [("Double", "C"), ("Double", "F"), ("Float", "C")])
 def test_a_tensor_is_what_torch_wrote(kind: str, order: Any) -> None:
-    assert (read_tensor(torch_file(ROWS, kind, order), "x.pt") == ROWS).all()
+    """However far it is from one to the next where there is only one."""
+    for rows in (ROWS, ROWS[0][None], np.asfortranarray(ROWS[0])[None]):
+        assert (read_tensor(torch_file(rows, kind, order), "x.pt") == ROWS).all()
+
+
+def laid(*strides: int) -> bytes:
+    """A tensor that is laid out neither by rows nor by columns."""
+    return torch_file(as_strided(np.arange(24.0), (2, 3, 4), [8 * n for n in strides]), order="A")
+
+
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (torch_file(ROWS).replace(b"M\xe9\x03", b"M\xea\x03"), "it does not begin like one"),
+        (torch_file(ROWS).replace(b"7q\x01a", b"8q\x01a"), "it has not just one storage"),
+        (torch_file(ROWS[:0]), "it has not just one storage"),
+        (torch_file(ROWS).replace(b"QK\x00", b"QK\x01"), "it is cut off"),
+        (laid(0, 4, 1), "its elements lie in an unknown order"),
+        (laid(0, 2, 6), "its elements lie in an unknown order"),
+    ],
+)
+def test_why_a_file_is_no_tensor(data: bytes, why: str) -> None:
+    with pytest.raises(DataError, match=f"torch wrote them: {why}$"):
+        read_tensor(data, "x.pt")
 
 
 @pytest.mark.parametrize("size", [0, 10, 100, 300, -8, -1])

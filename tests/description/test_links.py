@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -10,7 +11,9 @@ import pytest
 
 from pytest_simbench.description.links import (
     check_apart,
+    check_robot,
     ends,
+    frames,
     joined,
     link_poses,
     links_collide,
@@ -80,6 +83,9 @@ def test_points_of_a_link_that_became_part_of_another_are_in_its_frame() -> None
     assert found.second == "base"
     assert found.second_point == pytest.approx(at)
     assert not np.allclose(at, place)
+    one = replace(panda(), closures=(Closure("panda_hand", "panda_link7"),))
+    with pytest.raises(DescriptionError, match="'panda_hand' at 'panda_link7', and no joint betwe"):
+        reduced(PreparedRobot(one))
 
 
 @pytest.mark.parametrize(
@@ -94,6 +100,23 @@ def test_a_wrong_closure_is_refused(change: dict[str, object], message: str) -> 
     wrong = replace(robot.closures[0], **change)
     with pytest.raises(DescriptionError, match=message):
         reduced(PreparedRobot(replace(robot, closures=(wrong,))))
+
+
+def test_frames_of_a_closure_are_one_frame_where_the_joints_start() -> None:
+    closure = Closure("panda_link2", "panda_link5", (0.1, 0.2, 0.3), (-0.1, 0.3, 0.2))
+    first, second = frames(PREPARED, closure)
+    assert (first, second.position) == (Pose((0.1, 0.2, 0.3)), (-0.1, 0.3, 0.2))
+    poses = link_poses(PREPARED)
+    turns = [(poses[f"panda_link{k}"] * at).rotation() for k, at in ((2, first), (5, second))]
+    np.testing.assert_allclose(*turns, atol=1e-12)
+
+
+def test_what_is_no_srdf_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.srdf").write_text("<mujoco/>")
+    robot = replace(panda(), srdf=str(tmp_path / "a.srdf"))
+    with pytest.raises(DescriptionError, match="a.srdf is no SRDF: it holds <mujoco>, not <robot>"):
+        check_robot(robot)
+    check_robot(replace(robot, srdf=""))
 
 
 @pytest.mark.parametrize(

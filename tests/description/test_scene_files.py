@@ -40,8 +40,11 @@ def test_many_names_are_shortened() -> None:
 
 def test_the_page_has_a_row_each_and_first_what_is_not_carried() -> None:
     rows = markdown("my|file", ACCOUNT).splitlines()
-    assert rows[0] == "# What was carried of my\\|file"
-    assert rows[4:] == [
+    assert rows == [
+        "# What was carried of my\\|file",
+        "",
+        "| quantity | state | how, or why not | where |",
+        "|---|---|---|---|",
         "| geom margin | not carried | a \\| b | g\\<1\\> |",
         "| geom gap | not carried | why |  |",
         "| damping | approximated | by 3 % |  |",
@@ -104,6 +107,9 @@ def test_what_is_included_in_a_replicate_counts_as_often(
         )
         with pytest.raises(DescriptionError, match="more than 3") if refused else nullcontext():
             check_mjcf(str(tmp_path / "a.xml"))
+    monkeypatch.setitem(mjcf_check.MOST, "geom", 0)
+    with pytest.raises(DescriptionError, match="a.xml, line 1: too much is included"):
+        check_mjcf(str(tmp_path / "a.xml"))
 
 
 def test_a_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:
@@ -136,13 +142,14 @@ def test_files_beside_are_read_but_a_whole_home_is_no_room(
         check_mjcf(str(scene))
 
 
-def test_a_good_file_passes(tmp_path: Path) -> None:
+@pytest.mark.parametrize("folders", ['meshdir="meshes" assetdir="none"', 'assetdir="meshes"'])
+def test_a_good_file_passes(tmp_path: Path, folders: str) -> None:
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "m.stl").write_text("")
     (tmp_path / "b.xml").write_text('<mujocoinclude><include file="meshes/c.xml"/></mujocoinclude>')
     (tmp_path / "meshes" / "c.xml").write_text('<inside><mesh file="m.stl"/></inside>')
     (tmp_path / "a.xml").write_text(
-        '<mujoco><compiler meshdir="meshes"/><include file="b.xml"/><body/></mujoco>'
+        f'<mujoco><compiler {folders}/><compiler/><include file="b.xml"/><body/></mujoco>'
     )
     check_mjcf(str(tmp_path / "a.xml"))
 
@@ -162,7 +169,7 @@ def test_accounts_of_several_files_stand_side_by_side(tmp_path: Path) -> None:
     keep(tmp_path, "a.xml", ACCOUNT[1:])
     assert kept(tmp_path) == {"a.xml": tuple(ACCOUNT[1:]), "b.xml": tuple(ACCOUNT)}
     page = (tmp_path / "carried.md").read_text()
-    assert page.count("# What was carried of") == 2
+    assert page == f"{markdown('a.xml', ACCOUNT[1:])}\n{markdown('b.xml', ACCOUNT)}"
     shown = sections(tmp_path)
     assert [section.title for section in shown] == [
         "What was carried of a.xml", "What was carried of b.xml",

@@ -13,12 +13,15 @@ from pytest_simbench.description.shapes import (
     a_cylinder,
     a_round,
     box_corners,
+    capsule_hull,
+    cylinder_hull,
     mesh_points,
     outlines,
     placed,
     reach,
+    write_obj,
 )
-from pytest_simbench.scene import Pose
+from pytest_simbench.scene import Polytope, Pose
 from pytest_simbench.simulator import DescriptionError
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 3]], dtype=float)
@@ -70,9 +73,36 @@ def test_reach_of_what_is_round() -> None:
     angles = np.linspace(0, 2 * np.pi, 20000)
     rim = np.stack([0.3 * np.cos(angles), 0.3 * np.sin(angles), 0.4 + 0 * angles], axis=1)
     rims = placed(np.vstack([rim, rim * (1, 1, -1)]), pose)
-    np.testing.assert_allclose(a_cylinder(0.3, 0.8, pose)[1], reach(rims), atol=1e-6)
+    kind, reached = a_cylinder(0.3, 0.8, pose)
+    assert kind == a_round(0.3)[0] == "rounds"
+    np.testing.assert_allclose(reached, reach(rims), atol=1e-6)
     ends = placed(np.array([[0, 0, 0.4], [0, 0, -0.4]]), pose)
     np.testing.assert_allclose(a_round(0.3, 0.8, pose)[1], reach(ends) + 0.3)
+
+
+@pytest.mark.parametrize("half", [0.0, 0.5])
+def test_hulls_of_round_shapes_have_their_corners_on_them(half: float) -> None:
+    """And are smaller by what is told at most."""
+    ways = np.random.default_rng(0).normal(size=(20_000, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    corners, gap = capsule_hull(0.2, half)
+    axis = np.clip(corners[:, 2:], -half, half) * (0.0, 0.0, 1.0)
+    np.testing.assert_allclose(np.linalg.norm(corners - axis, axis=1), 0.2)
+    short = 0.2 + half * np.abs(ways[:, 2]) - (ways @ corners.T).max(axis=1)
+    assert 0.95 * gap < short.max() <= gap < 0.1 * 0.2
+    corners, gap = cylinder_hull(0.2, 0.5)
+    np.testing.assert_allclose(np.hypot(*corners.T[:2]), 0.2)
+    assert sorted(corners[:, 2]) == [-0.5] * 32 + [0.5] * 32
+    flat = ways[:, :2] / np.linalg.norm(ways[:, :2], axis=1, keepdims=True)
+    assert 0.2 - (flat @ corners[:, :2].T).max(axis=1).min() == pytest.approx(gap, rel=1e-3)
+
+
+def test_a_hull_is_written_as_text(tmp_path: Path) -> None:
+    hull = Polytope([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0)])
+    path = write_obj(tmp_path / "a.obj", hull)
+    np.testing.assert_array_equal(mesh_points(str(path)), np.unique(hull.points, axis=0))
+    sides = [line.split() for line in path.read_text().splitlines() if line.startswith("f ")]
+    assert [tuple(int(k) - 1 for k in side[1:]) for side in sides] == [*map(tuple, hull.triangles)]
 
 
 def test_order_is_by_what_tells_symmetric_shapes_apart() -> None:

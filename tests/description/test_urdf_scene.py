@@ -64,6 +64,8 @@ def test_joints_have_no_drives_and_the_dynamics_of_the_file(tmp_path: Path) -> N
     rail, hinge = scene.robot.joints
     assert (rail.passive_damping, rail.friction) == (4.0, 0.5)
     assert (hinge.passive_damping, hinge.friction) == (0.0, 0.0)
+    damped = read(tmp_path, (' friction=".5"', "")).scene.robot.joints[0]
+    assert (damped.passive_damping, damped.friction) == (4.0, 0.0)
     assert {(j.stiffness, j.damping, j.effort_limit, j.armature) for j in (rail, hinge)} == {
         (FREE, 0.0, FREE, 0.0)
     }
@@ -102,7 +104,13 @@ def test_of_everything_it_is_told_what_became_of_it(tmp_path: Path) -> None:
     knob = ('<box size=".02 .02 .1"/>', '<mesh filename="knob.stl"/>')
     follow = ("<dynamics", '<mimic joint="hinge" offset="1"/><dynamics')
     plain = ('<sphere radius=".05"/>', '<box size=".1 .1 .1"/>')
-    for name, changes in (("cabinet", [knob]), ("cabinet-follows", [follow, plain])):
+    coupled = ("<dynamics", '<mimic joint="hinge" multiplier=".2"/><dynamics')
+    away = ('"continuous">', '"revolute"><calibration/><limit lower=".5" upper="1"/>')
+    for name, changes in (
+        ("cabinet", [knob]),
+        ("cabinet-follows", [follow, plain]),
+        ("cabinet-coupled", [coupled, away, ('robot name="cabinet"', "robot")]),
+    ):
         account = read(tmp_path, *changes).account
         assert_approved(name, "\n".join(" | ".join(line.to_wire().values()) for line in account))
 
@@ -195,6 +203,9 @@ def test_without_a_file_or_a_joint_there_is_no_scene(tmp_path: Path) -> None:
         read(tmp_path, ("</robot>", ""))
     with pytest.raises(DescriptionError, match=r"none.urdf: No such file"):
         read_scene_file(tmp_path / "none.urdf")
+    (tmp_path / "a'b.urdf").write_text(CABINET)
+    with pytest.raises(DescriptionError, match=r"a'b.urdf: a scene has the name"):
+        read_scene_file(tmp_path / "a'b.urdf")
     (tmp_path / "post.urdf").write_text('<robot name="post"><link name="post"/></robot>')
     with pytest.raises(DescriptionError, match=r"post.urdf has no joint that moves"):
         read_scene_file(tmp_path / "post.urdf")

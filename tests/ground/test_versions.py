@@ -19,7 +19,7 @@ INFO = replace(
     oldest_version="1.2",
     tested_version="1.10.0",
     requirements=("engine==1.10.0", "helper==2"),
-    companions={"1.2": ("numpy<2",), "1.9": ("numpy", "helper")},
+    companions={"1.2": ("numpy<2",), "1.9": ("numpy", "helper"), "1.10.1": ("numpy",)},
 )
 
 
@@ -77,7 +77,7 @@ def test_an_older_release_is_refused_in_one_sentence() -> None:
     [
         ("1.2.5", ("engine==1.2.5", "numpy<2")),
         ("1.9", ("engine==1.9", "numpy", "helper")),
-        ("2.0", ("engine==2.0", "numpy", "helper")),
+        ("2.0", ("engine==2.0", "numpy")),
     ],
 )
 def test_what_a_release_needs_besides(version: str, needs: tuple[str, ...]) -> None:
@@ -85,9 +85,12 @@ def test_what_a_release_needs_besides(version: str, needs: tuple[str, ...]) -> N
     assert (info.requirements, info.home, info.name) == (needs, "", f"sim=={version}")
 
 
-def test_the_release_that_is_pinned_has_the_environment_of_the_bare_name() -> None:
+def test_the_pinned_release_has_the_environment_of_the_bare_name_and_a_build_none() -> None:
     info = INFO.of_version(VersionedName("sim", "==", "1.10.0"))
     assert (info.home, info.requirements) == ("sim", INFO.requirements)
+    build = INFO.of_version(VersionedName("sim", "@", "4.1.0"))
+    assert build == replace(INFO, name="sim@4.1.0", requirements=(), install=build.install)
+    assert build.install == "--sim sim@4.1.0=PATH"
 
 
 def test_the_adapter_of_a_version() -> None:

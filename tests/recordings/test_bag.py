@@ -17,6 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 from pytest_simbench.recordings import bag
 from pytest_simbench.recordings.bag import BagsUnavailable, frame_of, write_bag
 from pytest_simbench.recordings.trace import Trace
+from pytest_simbench.scene import Pose
 from tests.approval import assert_approved
 from tests.hostile import HOSTILE
 from tests.recordings.samples import SAMPLES, motion, trace
@@ -83,7 +84,6 @@ def test_links_stand_where_the_model_has_them(tmp_path: Path) -> None:
     from pytest_simbench.description.links import link_poses
     from pytest_simbench.description.urdf import PreparedRobot
     from pytest_simbench.motion.panda import panda
-    from pytest_simbench.scene import Pose
 
     kept = trace()
     write_bag(kept, tmp_path / "x")
@@ -109,12 +109,9 @@ def test_what_does_not_change_is_latched_and_said_once(tmp_path: Path) -> None:
     assert {topic for topic, sent in found.items() if len(sent) == 1} >= LATCHED
     assert all(found[topic][0][0] == found["/clock"][0][0] for topic in LATCHED)
     with AnyReader([tmp_path / "x"]) as reader:
-        durable = {
-            c.topic
-            for c in reader.connections
-            if "TRANSIENT_LOCAL" in str(c.ext.offered_qos_profiles)
-        }
-    assert durable == LATCHED
+        told = {c.topic: str(*c.ext.offered_qos_profiles) for c in reader.connections}
+    assert {topic for topic, quality in told.items() if "TRANSIENT_LOCAL" in quality} == LATCHED
+    assert_approved("qos", "\n".join(sorted(set(told.values()))))
     urdf = found["/robot_description"][0][1].data
     assert urdf.startswith("<robot")
     assert "mesh" not in urdf
@@ -135,6 +132,16 @@ def test_every_shape_has_a_marker_in_a_frame_that_there_is(tmp_path: Path) -> No
     assert sum(len(m.points) for m in triangles) == 3 * sum(
         len(m.faces) for m in kept.figure.meshes
     )
+
+
+def test_a_link_that_is_a_box_is_drawn_where_it_is(tmp_path: Path) -> None:
+    kept = trace()
+    box = replace(kept.figure.parts[3], mesh=None, size=(0.1, 0.2, 0.3), pose=Pose.at(1, 2, 3))
+    write_bag(replace(kept, figure=replace(kept.figure, parts=[box])), tmp_path / "x")
+    marker = messages(tmp_path / "x")["/markers"][0][1].markers[-1]
+    at, size = marker.pose.position, marker.scale
+    assert (marker.type, marker.ns, marker.header.frame_id) == (marker.CUBE, "robot", box.link)
+    assert [at.x, at.y, at.z, size.x, size.y, size.z] == [1.0, 2.0, 3.0, 0.1, 0.2, 0.3]
 
 
 def test_messages_are_what_somebody_approved(tmp_path: Path) -> None:

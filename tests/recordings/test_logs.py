@@ -35,7 +35,7 @@ def npz(folder: Path, **arrays: Any) -> Path:
 
 
 def table(folder: Path, text: str) -> Path:
-    (folder / "log.csv").write_text(text)
+    (folder / "log.csv").write_text(text, errors="surrogateescape")
     return folder / "log.csv"
 
 
@@ -62,7 +62,7 @@ def test_a_log_may_be_of_bodies_alone(tmp_path: Path) -> None:
     poses = np.tile([1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (21, 1))
     for world in (WHOLE, replace(WHOLE, robot=None)):
         log = read_log(npz(tmp_path, time=TIME, **{"table/pose": poses}), world)
-        assert log.joints == []
+        assert log.joints == beyond(log, world) == []
         assert log.trajectory.duration == pytest.approx(1.0)
         assert log.seen["table/pose"][:, 2] == pytest.approx(0.2)
 
@@ -91,10 +91,12 @@ def same(a: Log, b: Log) -> bool:
 
 def test_whole_arrays_are_in_the_order_of_the_scene(tmp_path: Path) -> None:
     position = np.stack([HINGE, 0.1 * TIME], axis=1)
-    whole = read_log(npz(tmp_path, time=TIME, position=position, velocity=position), SCENE)
-    names = {"hinge": HINGE, "slider": 0.1 * TIME, "hinge/velocity": HINGE}
-    by_name = npz(tmp_path, time=TIME, **names, **{"slider/velocity": 0.1 * TIME})
-    assert same(whole, read_log(by_name, SCENE))
+    parts = {"position": 1.0, "velocity": 2.0, "effort": 3.0}
+    path = npz(tmp_path, time=TIME, **{what: k * position for what, k in parts.items()})
+    whole, names = read_log(path, SCENE), {}
+    for part, k in zip(("", "/velocity", "/effort"), parts.values(), strict=True):
+        names |= {f"hinge{part}": k * HINGE, f"slider{part}": k * 0.1 * TIME}
+    assert same(whole, read_log(npz(tmp_path, time=TIME, **names), SCENE))
 
 
 def test_uneven_times_become_even_ones(tmp_path: Path) -> None:
@@ -108,9 +110,13 @@ def test_a_start_out_of_range_is_the_nearest_end_and_commands_are_as_logged(tmp_
     log = read_log(npz(tmp_path, time=TIME, slider=TIME + 1.2), SCENE)
     assert log.start.positions == (0.0, 1.0)
     assert log.trajectory.position[0, 1] == 1.2
-    (line,) = beyond(log, SCENE)
-    assert line.startswith("slider goes from 1.2 to 2.2 rad or m, and in scene")
-    assert not beyond(read_log(npz(tmp_path, time=TIME, slider=TIME), SCENE), SCENE)
+    told = "slider goes from {} to {} rad or m, and in scene 'two joints' it stops at -1 and 1"
+    assert beyond(log, SCENE) == [told.format(1.2, 2.2)]
+    below, level = (
+        read_log(npz(tmp_path, time=TIME, slider=TIME - end), SCENE) for end in (1.0011, 1.0009)
+    )
+    assert beyond(below, SCENE) == [told.format(-1.001, -0.0011)]
+    assert not beyond(level, SCENE)
     started = SCENE.at_start(log.start)
     assert started.robot.joints[1].initial_position == 1.0
 
@@ -181,6 +187,7 @@ def test_what_cannot_be_is_one_sentence(tmp_path: Path, arrays: Any, why: str) -
         ("time,time\n0,0\n", "two columns of one name"),
         ("time,hinge\n0,0\n1,nan\n", "no finite number of 'hinge' in row 1"),
         ("", "no column 'time'"),
+        ("\udcff,hinge\n0,0\n", "no column 'time'"),
     ],
 )
 def test_a_table_that_cannot_be_is_told_with_its_line(tmp_path: Path, text: str, why: str) -> None:

@@ -77,6 +77,8 @@ def about(path: Path, **changes: Any) -> np.ndarray:
         ({"body_names": np.array(["a", "b"])}, "not those of its scene"),
         ({"joint_names": np.array(list("abcdefghi"))}, "no positions of the joints"),
         ({"faces_0": np.full((3, 3), 10**6)}, "a face of a mesh has no vertices"),
+        ({"faces_0": np.zeros((3, 4), int)}, "its meshes' faces are not finite numbers"),
+        ({"vertices_0": np.zeros((9, 2))}, "its meshes' vertices are not finite numbers"),
         ({"time": None}, "it lacks 'time'"),
         ({"about": np.frombuffer(b"[1]", dtype=np.uint8)}, "is no trace of a repetition"),
         ({"about": np.frombuffer(b"{", dtype=np.uint8)}, "is no trace of a repetition"),
@@ -95,6 +97,10 @@ def test_what_is_no_trace_is_refused(changes: Any, message: str, tmp_path: Path)
         ("parent", "panda_link1", "hangs on none before it"),
         ("axis", [0.0, 0.0, 0.0], "division by zero"),
         ("axis", ["x", "y", "z"], "'hinges.0..axis.0.': expected 'float', got 'str'"),
+        ("link", "elbow", "a shape of 'elbow' is none"),
+        ("mesh", None, "a shape of 'base' is none"),
+        ("mesh", 99, "a shape of 'base' has no mesh"),
+        ("pose", {"quaternion": [2, 0, 0, 0]}, "the quaternion of a shape of 'base' has"),
         ("origin", 7, "origin': expected 'dict', got 'int'"),
         ("origin", {"quaternion": [2, 0, 0, 0]}, "the quaternion of the joint 'panda_joint1' has"),
     ],
@@ -103,7 +109,7 @@ def test_a_robot_or_phase_that_cannot_be_is_refused(
     key: str, value: Any, message: str, tmp_path: Path
 ) -> None:
     wire = trace().figure.to_wire()
-    wire["hinges"][0][key] = value
+    wire["parts" if key in ("link", "mesh", "pose") else "hinges"][0][key] = value
     told = {"phases": value} if key == "phases" else {"figure": wire}
     spoilt(tmp_path / "x.npz", about=about(tmp_path / "y.npz", **told))
     with pytest.raises(TraceError, match=message):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -24,6 +23,8 @@ from .build import failed, record
 
 def test_what_holds_a_run(tmp_path: Path) -> None:
     assert not RunFolder(tmp_path / "nowhere").holds_run
+    (told,) = RunFolder(tmp_path / "nowhere").scan().refused
+    assert told.endswith(" (No such file or directory); give a run folder or its records.jsonl")
     (tmp_path / "records.jsonl").touch()
     (tmp_path / "other.txt").write_text("x")
     assert not RunFolder(tmp_path).holds_run
@@ -106,7 +107,8 @@ def test_a_record_too_long_to_be_read_keeps_all_but_its_details(tmp_path: Path) 
     (found,) = RunFolder.of(path).read().records
     assert found.metrics == {"placed": 0.5}
     assert found.notes.log == "logs/a.log"
-    assert "more than a record may have" in found.notes.left_out
+    size = len(noted.to_json())
+    assert found.notes.left_out == f"{size} bytes, more than a record may have"
 
 
 def test_infinite_numbers_and_deep_nests_are_refused(tmp_path: Path) -> None:
@@ -217,7 +219,8 @@ def test_only_an_ordinary_file_in_the_folder_is_read(tmp_path: Path, name: str, 
     assert (found.records == ()) is (name == RECORDS)
     assert (found.tasks == {}) is (name == TASKS)
     (problem,) = (*found.problems, *found.refused)
-    assert re.search("no ordinary file|Is a directory|leads out of its folder", problem)
+    why = {"fifo": "it is no ordinary file", "folder": "Is a directory"}
+    assert f" ({why.get(kind, 'leads out of its folder or is a link')})" in problem
     assert RunFolder(run).repair() == ()
 
 
@@ -249,7 +252,11 @@ def test_a_lost_folder_is_read_from_memory(tmp_path: Path) -> None:
     assert [r.repetition for r in found.records] == [1]
     assert found.tasks == {"pouring": POURING}
     told = folder.close()
-    assert len(told) == 2
+    why = f"(File exists); they are in {Path(told[0].rpartition(' ')[2]).parent}"
+    assert told == tuple(
+        f"1 {noun} could not be written to {tmp_path / 'run' / name} {why}/{name}"
+        for noun, name in (("record", RECORDS), ("task description", TASKS))
+    )
     (spare,) = {Path(text.rpartition(" ")[2]).parent for text in told}
     again = RunFolder(spare).read()
     assert (again.records, again.tasks) == (found.records, found.tasks)

@@ -20,6 +20,7 @@ from pytest_simbench.records import lines
 from pytest_simbench.records.folder import RECORDS, RunFolder
 from pytest_simbench.records.lines import LARGEST_LINE, LinesFile
 
+from ..approval import assert_approved_line
 from .build import record
 
 HERE = Path(__file__).parent
@@ -35,6 +36,9 @@ def test_a_truncated_line_is_reported_and_the_next_record_starts_its_own(tmp_pat
     reading = RunFolder.of(path).read()
     assert [item.repetition for item in reading.records] == [0, 2]
     assert len(reading.problems) == 1
+    path.write_bytes(b"{")  # not more than that was written
+    RunFolder(path.parent).append(record(3))
+    assert [item.repetition for item in RunFolder.of(path).read().records] == [3]
 
 
 def test_a_full_disk_keeps_the_records_and_moves_them_elsewhere(tmp_path: Path) -> None:
@@ -55,12 +59,15 @@ def test_a_full_disk_keeps_the_records_and_moves_them_elsewhere(tmp_path: Path) 
 def test_records_that_no_disk_takes_are_handed_back(tmp_path: Path) -> None:
     blocked = tmp_path / "a file"
     blocked.touch()
-    file = LinesFile(Path("/dev"), "full", blocked)
+    file = LinesFile(Path("/dev"), "full", blocked, "record")
     file.append(record(0).to_json())
     report = file.close()
     assert report
     assert report.unsaved == (record(0).to_json(),)
-    assert "(File exists)" in report.problems[0]
+    assert report.problems == (
+        "1 record could not be written to /dev/full (No space left on device) nor to "
+        f"{blocked} (File exists); they follow, one a line: save them",
+    )
 
 
 def test_the_system_folder_is_the_fallback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,7 +201,9 @@ def test_damage_loses_nothing_else_and_is_repaired(tmp_path: Path, kind: str, pl
     reading = RunFolder(tmp_path).read()
     assert [r.repetition for r in reading.records] == [0, 1, 2, 3, 4]
     assert reading.problems
-    assert reading.problems[0].startswith(f"{path}:{at + 1}: the line is damaged and left out: ")
+    place, problem = reading.problems[0].split(": ", 1)
+    assert place == f"{path}:{at + 1}"
+    assert_approved_line("damaged", f"{kind}: {problem.partition(' (')[0]}")
     assert all(len(problem) < 400 for problem in reading.problems)
     before = path.read_bytes()
     (kept,) = RunFolder(tmp_path).repair()

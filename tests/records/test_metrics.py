@@ -22,8 +22,26 @@ def test_values_read_as_a_user_expects(metric: Metric, value: float, text: str) 
     assert metric.format(value) == text
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "differ"),
+    [(0.0125, 0.0134, False), (0.0125, 0.0136, True), (5.121, 5.124, False), (-0.01, 0.01, True)],
+)
+def test_two_values_differ_by_a_millimetre_that_is_seen(
+    before: float, after: float, differ: bool
+) -> None:
+    metric = Metric("x", "x", "m")
+    assert metric.differs(before, after) == metric.differs(after, before) == differ
+
+
+def test_a_crash_counts_with_the_worst_there_is() -> None:
+    for better, worst in (("higher", 0.0), ("lower", 1.0), (None, None)):
+        assert Metric("x", "x", better=better, kind="yes_no").crashed == worst
+        assert Metric("x", "x", better=better).crashed is None
+
+
 def test_an_unknown_name_lists_the_valid_ones_and_the_nearest() -> None:
     error = UnknownMetric("placd", ["moved", "placed"])
+    assert (error.name, error.valid) == ("placd", ["moved", "placed"])
     assert str(error) == (
         "no metric is named 'placd'; did you mean 'placed'? valid names: moved, placed"
     )

@@ -170,9 +170,11 @@ def test_rows_are_ranked_only_where_the_same_was_asked() -> None:
 
     assert ranked()
     assert ranked(settings={"timestep": 9.0})
+    rows = [series([replace(ours, settings={"task.levels": k})])[0] for k in (3, 3, 5)]
+    assert [comparable(rows[0], row) for row in rows] == [True, True, False]
     for name, value in {"jitter": 50.0, "protocol": "paper", "mode": "gui", "profile": "x"}.items():
         assert not ranked(**{name: value})
     runs = [record(1, test=f"test_{n}[{s}]", simulator=s) for s in "ab" for n in "xy"]
-    rows = {(row.key.simulator, row.label): row for row in series(runs)}
-    assert comparable(rows["a", "test_x"], rows["b", "test_x"])
-    assert not comparable(rows["a", "test_x"], rows["b", "test_y"])
+    found = {(row.key.simulator, row.label): row for row in series(runs)}
+    assert comparable(found["a", "test_x"], found["b", "test_x"])
+    assert not comparable(found["a", "test_x"], found["b", "test_y"])

@@ -44,7 +44,11 @@ def test_what_is_as_by_default_is_not_written() -> None:
 
 def test_restitution_and_damping_that_cannot_be() -> None:
     ball = Sphere("ball", 0.1, Pose(), 1.0)
-    for name, wrong in (("restitution", 1.1), ("linear_damping", -0.1), ("angular_damping", -1.0)):
+    for name, wrong in (
+        ("restitution", 1.1), ("restitution", -0.1), ("linear_damping", -0.1),
+        ("angular_damping", -1.0), ("linear_velocity", (0.0, math.nan, 0.0)),
+        ("angular_velocity", (1.0, 2.0)),
+    ):  # fmt: skip
         with pytest.raises(SceneError, match=f"the {name.replace('_', ' ')}.* of 'ball' is"):
             ball.changed(**{name: wrong})
 
@@ -54,6 +58,9 @@ def test_a_fixed_body_does_not_start_to_move_and_takes_no_force() -> None:
         Box("post", (1.0, 1.0, 1.0), Pose(), angular_velocity=(0.0, 0.0, 1.0))
     with pytest.raises(SceneError, match="'post' has no mass, so no force moves it"):
         Box("post", (1.0, 1.0, 1.0), Pose(), wrenches=(PULL,))
+    for more in ({"mass": 1.0}, {"linear_damping": 0.1}):
+        with pytest.raises(SceneError, match="'unit' moves as prescribed, so it has no mass and"):
+            UNIT.changed(prescribed=True, **more)
 
 
 R, L = 0.3, 0.8
@@ -244,6 +251,7 @@ def test_a_body_crosses(body: Body) -> None:
         ({"torque": (0.0, math.nan, 0.0)}, "the torque [N m] of a wrench is nan"),
         ({"start": 1.0, "end": 1.0}, "a wrench starts at 1.0 s and ends at 1.0 s"),
         ({"start": -1.0}, "the start [s] of a wrench is -1.0"),
+        ({"end": -1.0}, "the end [s] of a wrench is -1.0"),
     ],
 )
 def test_what_no_force_can_be(values: dict[str, Any], message: str) -> None:

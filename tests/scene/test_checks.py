@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Closure, Coupling, Gripper, Joint, Pose, Scene, SceneError
 from pytest_simbench.scene.body import ZERO
-from pytest_simbench.scene.robot import MotionLimits
+from pytest_simbench.scene.robot import FREE, MotionLimits
 from tests.hostile import HOSTILE, assert_harmless_terminal
 
 BOX = Box("a", (0.1, 0.1, 0.1), Pose.at(0, 0, 0.5), mass=1.0)
@@ -104,9 +104,9 @@ def test_a_joint_that_cannot_be(change: dict[str, Any], said: str) -> None:
         ({"tool_frame": "a/b"}, "the tool frame of 'panda' has the name 'a/b'"),
         ({"friction": NAN}, "the friction of 'panda' is nan"),
         ({"base": Pose((NAN, 0, 0))}, "the position of the base of 'panda' is nan"),
-        ({"joints": (JOINT, JOINT)}, "robot 'panda' has several drives for j"),
+        ({"joints": (JOINT, replace(JOINT, name="k")) * 2}, "has several drives for j, k$"),
         ({"gripper": Gripper(("x",), 0.1, 0.0, 1.0)}, "the gripper .* the joints x, which have no"),
-        ({"beside": ("panda_joint1",)}, "the joints panda_joint1 beside robot 'panda' must be its"),
+        ({"beside": ("panda_joint1", "x")}, "joints panda_joint1, x beside robot 'panda' must be"),
         ({"beside": ("panda_finger_joint2",)}, "_joint2 beside .* its last, after the gripper's"),
         ({"stand": Pose((NAN, 0, 0))}, "the position of the stand of 'panda' is nan"),
         ({"swing": ((0.0,) * 7, (0.0,) * 6)}, "the swing .* of 'panda' .* must be 7 numbers"),
@@ -137,6 +137,16 @@ def test_what_joins_links_and_joints_and_cannot() -> None:
     ):  # fmt: skip
         with pytest.raises(SceneError):
             kind(*values)
+
+
+def test_the_last_that_can_be() -> None:
+    made = replace(BOX, name="x" * 100, mass=1e6, friction=0.0, restitution=1.0)
+    assert (len(made.name), made.mass) == (100, 1e6)
+    assert [replace(JOINT, stiffness=k).stiffness for k in (0.0, 2.0)] == [FREE, 2.0]
+    replace(BOX, pose=Pose(quaternion=(0.9991, 0.0, 0.0, 0.0)))
+    for length in (0.9989, 1.0011):
+        with pytest.raises(SceneError, match=r"has the length .*; it must be 1 \(w, x, y, z\)"):
+            replace(BOX, pose=Pose(quaternion=(0.0, length, 0.0, 0.0)))
 
 
 def test_numbers_of_numpy_are_numbers() -> None:

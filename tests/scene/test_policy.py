@@ -47,7 +47,10 @@ def test_another_is_refused(rhythm: Rhythm, told: str) -> None:
         rhythm.steps(1 / 240)
 
 
-@pytest.mark.parametrize("given", [{"rate": 0.0}, {"rate": math.nan}, {"command_latency": -1.0}])
+@pytest.mark.parametrize(
+    "given",
+    [{"rate": 0.0}, {"rate": math.nan}, {"command_latency": -1.0}, {"observation_delay": -1.0}],
+)
 def test_so_is_what_is_no_rhythm(given: dict[str, float]) -> None:
     with pytest.raises(LoopError):
         Rhythm(**{"rate": 10.0, **given})
@@ -168,6 +171,8 @@ def test_motors_take_efforts_alone() -> None:
     assert at.effort.tolist() == [2.0] * 9
     at.after(Command(effort=np.arange(7.0)))
     assert at.effort.tolist() == [*range(7), 0.0, 0.0]
+    at.after(Command(gripper=0.03))  # without a model of the hand each finger goes half the way
+    assert at.position[7:].tolist() == [0.015, 0.015]
 
 
 def test_a_robot_without_a_hand_is_moved_by_all_its_joints() -> None:
@@ -183,6 +188,9 @@ def test_without_a_model_the_tool_is_refused() -> None:
     for answer in (Command(tool_change=np.zeros(6)), Command(tool=Pose())):
         with pytest.raises(PolicyError, match="inside the worker"):
             points(None).after(answer)
+    seen = Sight(SCENE).seen(0.0, np.zeros((2, 9)), np.zeros((3, 9)), np.zeros((1, 13)))
+    with pytest.raises(PolicyError, match="a policy does not see the pose of the tool"):
+        _ = seen.tool
 
 
 def test_what_is_seen() -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pytest_simbench.ground.errors import NotSupportedError
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Pose, Scene, SceneError
 from pytest_simbench.simulator import Seen, Simulator, chosen_on, heavy, lazy_import
@@ -37,6 +38,18 @@ def test_a_world_begins_with_no_steps_and_the_links_that_a_scene_names() -> None
     assert toy.prepared is None
     with pytest.raises(SceneError, match="no such link"):
         toy.begin(Scene("s", robot=panda(), apart=(("ground", "link/elbow"),)))
+
+
+def test_what_an_adapter_does_not_have_is_told() -> None:
+    for method, *given, what in (
+        (Simulator.read_file, "x", "reader of files"), (Simulator.push, 0, "forces on bodies"),
+        (Simulator.lead, 0, 0, "bodies that move as prescribed"), (Simulator.save, "save and rest"),
+        (Simulator.restore, 0, "save and restore"), (Simulator.contact_count, "contact count"),
+        (Simulator.contact_forces, "contact forces"), (Simulator.joint_wrenches, "joint wrenches"),
+        (Simulator.render, 1, 1, "offscreen picture"),
+    ):  # fmt: skip
+        with pytest.raises(NotSupportedError, match=f"^toy has no {what}"):
+            method(Toy(), *given)
 
 
 def test_what_adapters_share(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -75,6 +75,7 @@ def test_a_report_on_the_data_of_choosing_says_so(numbers: Sequence[int], senten
     notes = [note for row in found.rows for note in row.notes]
     whole = "its settings were chosen on {} repetitions are held against them: publish others"
     assert notes == ([whole.format(sentence)] if sentence else [])
+    assert Seen.motions("cube_tosses", 2, 4).holds("tossing", 6, ("cube_tosses", 3))
     others = [seen[0].holds("tossing", 6, sample) for sample in (("other", 6), None)]
     assert others == [False, False]
 

@@ -109,11 +109,19 @@ def test_a_program_that_does_not_start(fault: str, message: str) -> None:
 def test_a_program_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(SimulatorError, match="It cannot be started: .*'/nowhere/it'"):
         Program("It", ["/nowhere/it"], tmp_path)
+    with pytest.raises(SimulatorError, match="program was not started: no scene was loaded$"):
+        Outside(Outside.profiles["tuned"]).step()
 
 
-def test_the_last_words_of_one_that_ends_are_all_it_said(tmp_path: Path) -> None:
-    program = Program("It", ["/bin/sh", "-c", "echo one; sleep 0.1; echo two; exit 3"], tmp_path)
-    with pytest.raises(SimulatorError, match="It exited with status 3 .* words: one two$"):
+@pytest.mark.parametrize(
+    ("says", "words"),
+    [("echo one; sleep 0.1; echo two;", "its last words: one two"), ("", "it wrote nothing")],
+)
+def test_the_last_words_of_one_that_ends_are_all_it_said(
+    tmp_path: Path, says: str, words: str
+) -> None:
+    program = Program("It", ["/bin/sh", "-c", f"{says} exit 3"], tmp_path)
+    with pytest.raises(SimulatorError, match=f"It exited with status 3 .*; {words}$"):
         program.wait_until(lambda: False, PATIENCE)
 
 

@@ -33,6 +33,7 @@ from ..conftest import ADAPTERS
         ("condim", "4", 4),
         ("solref", "0.01/1", (0.01, 1.0)),
         ("solref", (0.01, 1), (0.01, 1.0)),
+        ("solimp", "0/1/0.5", (0.0, 1.0, 0.5)),
     ],
 )
 def test_texts_become_values(name: str, text: Any, value: Any) -> None:
@@ -62,7 +63,7 @@ def test_texts_become_values(name: str, text: Any, value: Any) -> None:
         ({"iterations": 10**26}, "mujoco.iterations=1e.26: give a number below 2147483648"),
         ({"noslip_iterations": -1}, "noslip_iterations=-1: give a number from 0 on, 0 to 20 for"),
         ({"solref": (0.02, 0)}, "mujoco.solref/2=0: give a number above 0"),
-        ({"solimp": "5/5/5"}, "mujoco.solimp/1=5: give a number from 0 to 1, 0.5 to 0.999 for"),
+        ({"solimp": "1.01/5/5"}, "mujoco.solimp/1=1.01: give a number from 0 to 1, 0.5 to 0.999"),
         ({3: 3}, "mujoco has no setting 3; choose from .*timestep=0.002"),
         ({"x" * 9999: 3}, "mujoco has no setting 'xxxxx.{,40}; choose from .*timestep=0.002"),
         ({"cone": "x" * 9999}, "mujoco.cone='xxxxx.{,40}: choose from pyramidal, elliptic"),
