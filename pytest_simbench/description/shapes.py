@@ -163,11 +163,17 @@ def cylinder_hull(radius: float, half: float) -> tuple[FloatArray, float]:
 
 def capsule_hull(radius: float, half: float = 0.0) -> tuple[FloatArray, float]:
     """The same of a capsule, `half` the length between its ends' middles; 0: a sphere."""
+    points, gap = _unit_capsule(half / radius)
+    return radius * points, radius * gap
+
+
+@lru_cache
+def _unit_capsule(half: float) -> tuple[FloatArray, float]:
     ways = directions(MOST)
-    points = radius * ways + np.array([0.0, 0.0, half]) * np.sign(ways[:, 2:])
+    points = ways + np.array([0.0, 0.0, half]) * np.sign(ways[:, 2:])
     hull = Polytope(points)  # farthest from the capsule across the middles of its faces
     away = (hull.normals * points[[face[0] for face in hull.faces]]).sum(axis=1)
-    return points, float((radius + half * np.abs(hull.normals[:, 2]) - away).max())
+    return points, float((1 + half * np.abs(hull.normals[:, 2]) - away).max())
 
 
 def directions(count: int) -> FloatArray:
