@@ -175,6 +175,20 @@ def test_a_release_lives_in_its_own_even_where_the_engine_is_installed_here(
     assert missing(adapter("mujoco").info) is None
 
 
+def test_uv_is_taken_from_beside_the_interpreter_or_else_from_the_path(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    places = [tmp_path / name / "uv" for name in ("beside", "path")]
+    monkeypatch.setattr(sys, "executable", str(places[0].with_name("python")))
+    monkeypatch.setenv("PATH", str(places[1].parent))
+    found = [environments.uv()]
+    for place in reversed(places):
+        place.parent.mkdir()
+        place.touch(0o755)
+        found.append(environments.uv())
+    assert found == [None, str(places[1]), str(places[0])]
+
+
 def test_pips_configuration_is_uvs_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("UV_INDEX", "mine")
     told = {"index-url": "a", "extra-index-url": "b c", "find-links": "d e", "timeout": "9"}

@@ -76,7 +76,8 @@ def in_words(picture: Picture) -> Iterator[str]:
         for side, ends in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
             yield f"{side.get_scale()} {told(ends)} {side.get_tick_params()} {looks(side.label)}"
             if isinstance(side.get_major_locator(), FixedLocator) or side.get_scale() != "linear":
-                yield from map(looks, side.get_ticklabels())
+                small = (text for text in side.get_ticklabels(minor=True) if text.get_text())
+                yield from map(looks, [*side.get_ticklabels(), *small])
         inside = [each for each in panel.get_children() if not isinstance(each, Spine | Axis)]
         yield from (looks(each) for each in inside if getattr(each, "get_text", lambda: 1)())
     for legend in filter(None, [*figure.legends, *(panel.get_legend() for panel in figure.axes)]):
@@ -246,6 +247,10 @@ def test_the_sheet_is_in_the_folder_and_on_the_page(tmp_path: Path) -> None:
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.count('src="data:image/png;base64,iVBOR') == 1
     assert "img-src data:;" in page
+    (tmp_path / sheet_name("stacking")).unlink()
+    (tmp_path / sheet_name("stacking")).mkdir()
+    (problem,) = write_files(tmp_path, Report(summarise(kept, METRICS), kept)).problems
+    assert f"{sheet_name('stacking')} could not be written" in problem
 
 
 def test_hostile_names_do_no_harm_and_what_cannot_be_read_is_told(tmp_path: Path) -> None:

@@ -141,6 +141,8 @@ def test_the_step_to_take_the_order_and_the_cheapest_steps() -> None:
     assert broken == {"simulator": ["ode"], "laws": ["fall"]}
     assert failures["steps"] == ["2ms"]
     assert failures["message"] == ["it left the room"]
+    lost = sweep.details(swept([law("a", "fall", None, step=h) for h in (1e-3, 2e-3)]))
+    assert texts(lost[-1].columns)["steps"] == ["2ms, 1ms"]
 
 
 def test_laws_that_no_step_helps_are_named() -> None:
