@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.scene.checks import SceneError
-from pytest_simbench.scene.pose import FloatArray, Pose, Vector3, quaternion_of, vector3
+from pytest_simbench.scene.pose import (
+    FloatArray,
+    Pose,
+    Vector3,
+    principal_axes,
+    quaternion_of,
+    vector3,
+)
 
 MOST = 64
 """Corners of a mesh, as many as the engine that takes fewest does, of hulls for a GPU."""
@@ -175,7 +182,6 @@ def principal(points: Sequence[Sequence[float]] | FloatArray) -> tuple[tuple[Vec
     found = Polytope(found.points[found.corners])
     turn = np.eye(3)
     if not found.aligned:
-        turn = np.linalg.eigh(found.inertia)[1]
-        turn[:, 0] *= np.sign(np.linalg.det(turn))
+        turn = principal_axes(found.inertia)[1]
     vertices = tuple(vector3(row) for row in (found.points - found.centroid) @ turn)
     return vertices, Pose.from_array([*found.centroid, *quaternion_of(turn)])

@@ -48,7 +48,22 @@ def quaternion_of(rotation: FloatArray) -> FloatArray:
     k[1, :2] = r[2, 1] - r[1, 2], r[0, 0] - r[1, 1] - r[2, 2]
     k[2, :3] = r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], r[1, 1] - r[0, 0] - r[2, 2]
     k[3] = r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], r[2, 2] - r[0, 0] - r[1, 1]
-    return np.asarray(np.linalg.eigh(k)[1][:, -1])
+    return _signed(np.linalg.eigh(k)[1][:, -1:])[:, 0]
+
+
+def principal_axes(inertia: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Principal moments of a tensor, ascending, (3,), and the turn to their axes, (3, 3)."""
+    moments, axes = np.linalg.eigh(inertia)
+    axes = _signed(axes)
+    axes[:, 0] *= np.sign(np.linalg.det(axes))
+    return moments, axes
+
+
+def _signed(vectors: FloatArray) -> FloatArray:
+    """Eigenvectors, as columns, of which the first number that is not about 0 is positive. Either
+    sign is right, and LAPACK's depends on the processor."""
+    first = (np.abs(vectors) > 1e-6).argmax(axis=0)
+    return np.asarray(vectors * np.sign(vectors[first, np.arange(vectors.shape[1])]))
 
 
 def turn_of_z(direction: FloatArray) -> Quaternion:

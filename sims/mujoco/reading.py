@@ -17,7 +17,7 @@ from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRI
 from pytest_simbench.description.urdf import ROOT
 from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene, SceneError, Start, Wrench
 from pytest_simbench.scene.checks import FORBIDDEN, RESERVED
-from pytest_simbench.scene.pose import quaternion_of, vector3
+from pytest_simbench.scene.pose import principal_axes, quaternion_of, vector3
 from pytest_simbench.scene.scene import ROOM
 from pytest_simbench.simulator import DescriptionError, lazy_import
 
@@ -224,8 +224,7 @@ class Reading:
                     body = body.changed(moments=vector3(np.diag(turned)))
                 body = self._borne(self._damped(body, root, centre), root)
                 return Placed(body, root, geoms, shapes[0].pose)
-        moments, axes = np.linalg.eigh(tensor)
-        axes[:, 0] *= np.sign(np.linalg.det(axes))
+        moments, axes = principal_axes(tensor)
         frame = _pose(centre, quaternion_of(axes))
         inverse = frame.inverse()
         body = Compound(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Pose, Scene, SceneError, Sphere, Start, Trajectory
 from pytest_simbench.scene.plausibility import implausible
-from pytest_simbench.scene.pose import quaternion_of
+from pytest_simbench.scene.pose import principal_axes, quaternion_of
 
 
 def box(name: str, x: float, **more: float) -> Box:
@@ -126,6 +127,23 @@ def test_tilt_is_the_angle_to_the_nearest_face(tilt: float, quarter: int) -> Non
 def test_the_quaternion_of_a_matrix_undoes_it(a: Pose) -> None:
     found = Pose(quaternion=tuple(quaternion_of(a.rotation())))
     assert np.allclose(found.rotation(), a.rotation(), atol=1e-9)
+    assert begins_positive(found.quaternion)
+
+
+@given(poses())
+def test_principal_axes_have_one_sign(a: Pose) -> None:
+    """Scenes are told apart by a digest: no two machines may write them in two ways."""
+    turn, moments = a.rotation(), np.diag([1.0, 2.0, 4.0])
+    found, axes = principal_axes(turn @ moments @ turn.T)
+    assert np.allclose(found, [1.0, 2.0, 4.0])
+    assert np.allclose(axes * found @ axes.T, turn @ moments @ turn.T)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    assert begins_positive(axes[:, 1])
+    assert begins_positive(axes[:, 2])
+
+
+def begins_positive(numbers: Any) -> bool:
+    return next(x for x in numbers if abs(x) > 1e-6) > 0
 
 
 TIMESTEPS = st.sampled_from([0.0005, 0.001, 0.002, 1 / 240, 0.004, 0.01])

@@ -22,16 +22,17 @@ SEED = 920001
 
 SAME = 2e-3
 """Not all processors have the same instructions, and a push adds up what is in the last digits.
-PhysX's pushes along a curve do so most: 3.50 and 3.58 mm in SAPIEN. They are not asked here."""
+OpenBLAS takes other kernels on AMD's processors than on Intel's with AVX-512 (`OPENBLAS_CORETYPE=
+Haswell` and `SkylakeX` show it). Plans then differ by 2e-15 rad, and the first push along a curve
+ends 2.1 or 1.5 mm off in MuJoCo, 1.6 or 2.1 in PyBullet, whose line differs too. PhysX's differ
+from machine to machine (3.50 and 3.58 mm in SAPIEN). These are not asked here."""
 
 FAST = ("dart", "drake", "mujoco", "ovphysx", "pybullet", "sapien")
+LINE = ("dart", "drake", "mujoco", "ode", "ovphysx", "sapien")
+CURVE = ("dart", "drake")
 ASKED: list[tuple[str, str, dict[str, str], Task]] = [
-    *((name, "pushing", {"robot": "panda", "way": "line"}, Pushing()) for name in (*FAST, "ode")),
-    *(
-        (name, "pushing", {"robot": "panda", "way": "curve"}, CurvePushing())
-        for name in FAST
-        if name not in ("ovphysx", "sapien")
-    ),
+    *((name, "pushing", {"robot": "panda", "way": "line"}, Pushing()) for name in LINE),
+    *((name, "pushing", {"robot": "panda", "way": "curve"}, CurvePushing()) for name in CURVE),
     *((name, "throwing", {"rules": "ours"}, Throwing(settle=0.1)) for name in FAST),
 ]
 COMPARED = {
