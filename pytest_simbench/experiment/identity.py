@@ -119,12 +119,20 @@ def _robot_digest(robot: Robot) -> str:
     return hashlib.sha256(data.encode()).hexdigest()[:12]
 
 
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f"{round(value, 12) + 0.0:.10g}")
+    if isinstance(value, Mapping):
+        return {key: _rounded(item) for key, item in value.items()}
+    return [*map(_rounded, value)] if isinstance(value, list | tuple) else value
+
+
 def scene_digest(task: Task, chosen: Robot | None = None) -> str:
     """Twelve digits of what the task builds for one seed without jitter; empty if it builds none.
 
     A robot's files count with their content, not their place; a scene's with what was read. A robot
     of the task's own, neither `chosen` by an option nor a built-in one as it is, counts with all
-    that it is.
+    that it is. Processors differ in the last digits of what is computed: ten digits count.
     """
     try:
         try:
@@ -141,7 +149,7 @@ def scene_digest(task: Task, chosen: Robot | None = None) -> str:
                 as_it_is = known_robot(own.name) if own.name in BUILT_IN else None
                 if describe_robot(own) != describe_robot(as_it_is):
                     wire["own"] = describe_robot(own)
-        data = json.dumps(wire, sort_keys=True, default=str)
+        data = json.dumps(_rounded(wire), sort_keys=True, default=str)
     except Exception:  # a task may refuse this seed; then nothing is known
         return ""
     return hashlib.sha256(data.encode()).hexdigest()[:12]

@@ -10,6 +10,7 @@ from unittest.mock import Mock, call
 import pytest
 
 from pytest_simbench.description.robot_files import robot_cache
+from pytest_simbench.experiment import identity
 from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import describe_robot, expected, scene_digest
@@ -206,6 +207,19 @@ def test_a_record_says_what_it_was(case: Case) -> None:
 )  # fmt: skip
 def test_phases_that_count_on_are_told_together_and_no_others(phase: str, told: str) -> None:
     assert group(phase) == told
+
+
+@pytest.mark.parametrize(("off", "same"), [(1e-15, True), (3e-14, True), (1e-9, False)])
+def test_a_scene_is_the_same_on_processors_that_differ_in_last_digits(
+    monkeypatch: pytest.MonkeyPatch, off: float, same: bool
+) -> None:
+    """Numbers of about 500 and of 0 too."""
+    found = []
+    for far in (0.0, off):
+        wire = {"bodies": [{"pose": (0.3 + far, far, -far)}], "stiffness": 545.150123097334 + far}
+        monkeypatch.setattr(identity, "_wire", lambda task, wire=wire: wire)
+        found.append(scene_digest(Falling()))
+    assert (found[0] == found[1]) is same
 
 
 def test_a_robot_of_the_task_s_own_counts_with_its_swing(case: Case) -> None:
