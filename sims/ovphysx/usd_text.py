@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pytest_simbench.scene import FloatArray, Pose
-from pytest_simbench.scene.pose import principal_axes, quaternion_of
+from pytest_simbench.scene.pose import quaternion_of
 
 
 def turn_from_x(axis: FloatArray) -> tuple[float, float, float, float]:
@@ -30,9 +30,11 @@ def mass_lines(mass: float, centre: FloatArray, inertia: FloatArray) -> list[str
         centre: of mass, in the body's frame [m].
         inertia: tensor about it, body axes, (3, 3) [kg m^2].
     """
-    moments, axes = principal_axes(inertia)
+    moments, axes = np.linalg.eigh(inertia)  # PhysX's bits, and so all tables, hang on these axes
     if np.allclose(inertia, np.diag(np.diag(inertia)), rtol=0, atol=1e-15):
         moments, axes = np.diag(inertia), np.eye(3)
+    if np.linalg.det(axes) < 0:
+        axes[:, 0] *= -1
     return [
         f"float physics:mass = {float(mass)!r}",
         f"point3f physics:centerOfMass = {numbers(centre)}",
