@@ -18,7 +18,7 @@ from pytest_simbench.client.environments import outside
 from pytest_simbench.description.robot_files import CONTENT, robot_cache, with_content
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.ground.names import file_name
+from pytest_simbench.ground.names import data_digest, file_name
 from pytest_simbench.ground.versions import VersionedName
 from pytest_simbench.motion.registry import BUILT_IN, known_robot
 from pytest_simbench.records.configuration import text
@@ -119,20 +119,12 @@ def _robot_digest(robot: Robot) -> str:
     return hashlib.sha256(data.encode()).hexdigest()[:12]
 
 
-def _rounded(value: Any) -> Any:
-    if isinstance(value, float):
-        return float(f"{round(value, 12) + 0.0:.10g}")
-    if isinstance(value, Mapping):
-        return {key: _rounded(item) for key, item in value.items()}
-    return [*map(_rounded, value)] if isinstance(value, list | tuple) else value
-
-
 def scene_digest(task: Task, chosen: Robot | None = None) -> str:
     """Twelve digits of what the task builds for one seed without jitter; empty if it builds none.
 
     A robot's files count with their content, not their place; a scene's with what was read. A robot
     of the task's own, neither `chosen` by an option nor a built-in one as it is, counts with all
-    that it is. Processors differ in the last digits of what is computed: ten digits count.
+    that it is.
     """
     try:
         try:
@@ -149,10 +141,9 @@ def scene_digest(task: Task, chosen: Robot | None = None) -> str:
                 as_it_is = known_robot(own.name) if own.name in BUILT_IN else None
                 if describe_robot(own) != describe_robot(as_it_is):
                     wire["own"] = describe_robot(own)
-        data = json.dumps(_rounded(wire), sort_keys=True, default=str)
+        return data_digest(wire, 12)
     except Exception:  # a task may refuse this seed; then nothing is known
         return ""
-    return hashlib.sha256(data.encode()).hexdigest()[:12]
 
 
 @lru_cache(maxsize=16)

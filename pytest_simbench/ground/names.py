@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import re
+from collections.abc import Mapping
+from typing import Any
 
 LONGEST = 80
 """Characters of the readable part: with digest, number and ending far below the 255 of Linux."""
@@ -36,3 +39,18 @@ def digest(*parts: object) -> str:
     """Ten hexadecimal digits that tell these texts apart."""
     data = "\0".join(f"{len(str(part))}:{part}" for part in parts)
     return hashlib.sha256(data.encode("utf-8", "surrogatepass")).hexdigest()[:10]
+
+
+def data_digest(data: Mapping[str, Any], length: int) -> str:
+    """So many hexadecimal digits that tell data as for JSON apart. In the last digits of what is
+    computed processors differ, so ten digits and at most twelve decimals of a number count."""
+    text = json.dumps(_rounded(data), sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:length]
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f"{round(value, 12) + 0.0:.10g}")
+    if isinstance(value, Mapping):
+        return {key: _rounded(item) for key, item in value.items()}
+    return [*map(_rounded, value)] if isinstance(value, list | tuple) else value

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 
 from pytest_simbench.client.world import World
 from pytest_simbench.description.urdf import PreparedRobot
+from pytest_simbench.ground.names import data_digest
 from pytest_simbench.records.metrics import RESOLUTIONS, Metric
 from pytest_simbench.scene import Body, Compound, FloatArray, Pose, Scene, SceneError, Start
 from pytest_simbench.tasks.base import Jitter, Task, distance
@@ -38,10 +37,9 @@ class OnScene(Task):
         wire = self.world.to_wire()
         if wire.pop("file", "") and (robot := wire["robot"]):  # where they are differs by machine
             wire["robot"] = {**robot, "urdf": Path(robot["urdf"]).name}
-        data = json.dumps(wire, sort_keys=True, default=float).encode()
         return {
             "task.scene": self.world.name,
-            "task.scene_digest": digest(data),
+            "task.scene_digest": data_digest(wire, 16),
             "task.starts": len(self.world.starts),
         }
 
@@ -110,11 +108,6 @@ FARTHEST = Metric(
     "farthest", "farthest from the start", unit="mm", better=None, least=0,
     doc="of the free body that is farthest from where it started, at the end",
 )  # fmt: skip
-
-
-def digest(data: bytes) -> str:
-    """16 digits."""
-    return hashlib.sha256(data).hexdigest()[:16]
 
 
 def places(world: World) -> dict[str, Pose]:

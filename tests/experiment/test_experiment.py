@@ -10,7 +10,6 @@ from unittest.mock import Mock, call
 import pytest
 
 from pytest_simbench.description.robot_files import robot_cache
-from pytest_simbench.experiment import identity
 from pytest_simbench.experiment.case import PROTOCOLS, Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.identity import describe_robot, expected, scene_digest
@@ -22,7 +21,8 @@ from pytest_simbench.motion.model import scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
 from pytest_simbench.records.record import Record
-from pytest_simbench.tasks import Reaching
+from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.tasks import Reaching, Settling
 from pytest_simbench.tasks.base import Task
 from tests.description.test_urdf_check import stl
 from tests.made_up import MadeUp
@@ -211,15 +211,13 @@ def test_phases_that_count_on_are_told_together_and_no_others(phase: str, told: 
 
 @pytest.mark.parametrize(("off", "same"), [(1e-15, True), (3e-14, True), (1e-9, False)])
 def test_a_scene_is_the_same_on_processors_that_differ_in_last_digits(
-    monkeypatch: pytest.MonkeyPatch, off: float, same: bool
+    off: float, same: bool
 ) -> None:
-    """Numbers of about 500 and of 0 too."""
-    found = []
-    for far in (0.0, off):
-        wire = {"bodies": [{"pose": (0.3 + far, far, -far)}], "stiffness": 545.150123097334 + far}
-        monkeypatch.setattr(identity, "_wire", lambda task, wire=wire: wire)
-        found.append(scene_digest(Falling()))
-    assert (found[0] == found[1]) is same
+    """In both digests that a record has of a scene."""
+    made = [Box("a", (0.1,) * 3, Pose((0.3 + far, far, 1.0 - far)), 1.0) for far in (0.0, off)]
+    first, second = (Settling(Scene("s", (box,))) for box in made)
+    assert (first.parameters() == second.parameters()) is same
+    assert (scene_digest(first) == scene_digest(second)) is same
 
 
 def test_a_robot_of_the_task_s_own_counts_with_its_swing(case: Case) -> None:

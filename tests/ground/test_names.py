@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pytest_simbench.ground.names import file_name
+from pytest_simbench.ground.names import data_digest, file_name
 
 texts = st.text(st.characters(exclude_categories=()), max_size=300)
 near = st.text(st.sampled_from("aAbB/_.-: "), max_size=6)
@@ -58,3 +59,14 @@ def test_what_is_left_of_a_name_word_by_word() -> None:
     assert re.fullmatch(r"a-0123456789-[0-9a-f]{10}", file_name("a-0123456789"))
     assert re.fullmatch(r"a-[0-9a-f]{10}", file_name("a", 1))
     assert re.fullmatch(r"X_y_X-[0-9a-f]{10}", file_name("..X y X.-"))
+
+
+def test_numbers_are_alike_where_processors_differ() -> None:
+    """Of about 500, and of 0. What is no number stays, and so does an infinite one."""
+    here = {"k": [545.150123097334, {"x": 6.6e-24}], "far": float("-inf"), "n": 3, "t": ("a", None)}
+    there = {**here, "k": [545.150123097335, {"x": -1e-17}]}
+    assert data_digest(here, 16) == data_digest(there, 16)
+    told = '{"far": -Infinity, "k": [545.1501231, {"x": 0.0}], "n": 3, "t": ["a", null]}'
+    assert data_digest(there, 9) == hashlib.sha256(told.encode()).hexdigest()[:9]
+    other = [{**here, "k": [545.1501232, {"x": x}]} for x in (0.0, 2e-12)]
+    assert len({data_digest(one, 12) for one in (here, *other)}) == 3
