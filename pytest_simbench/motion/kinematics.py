@@ -28,6 +28,10 @@ TURN_WEIGHT = 0.01
 LIMIT_MARGIN = 0.02
 """Distance that solutions keep from the joint limits [rad]."""
 
+DECIMALS = (7, 6, 4)
+"""Of positions [rad or m], velocities and efforts that an arm is told. What OpenBLAS computes after
+them differs by processor, and a push that is told of it ends up to 0.6 mm elsewhere."""
+
 DOWNWARD = Pose(quaternion=(0.0, 1.0, 0.0, 0.0))
 """A tool that points down, its y axis (the fingers' opening direction) along minus world y."""
 
@@ -134,7 +138,8 @@ def straight_line(model: RobotModel, start: FloatArray, target: Pose) -> FloatAr
     last = pin.SE3(target.matrix())
     turn = pin.log3(first.rotation.T @ last.rotation)
     length = float(np.linalg.norm(last.translation - first.translation))
-    steps = max(2, int(np.ceil(max(length / 0.01, float(np.linalg.norm(turn)) / 0.1))))
+    # 10 cm are 10 steps, whatever the last digits say
+    steps = max(2, int(np.ceil(max(length / 0.01, float(np.linalg.norm(turn)) / 0.1) - 1e-6)))
     line = [
         pin.SE3(
             first.rotation @ pin.exp3(share * turn),
@@ -270,7 +275,7 @@ class Servo:
             )
         change = arm - start
         arm = start + change / max(1.0, float((np.abs(change) / (self._fastest * seconds)).max()))
-        return np.concatenate([arm, position[model.arm :]])
+        return np.concatenate([arm.round(DECIMALS[0]), position[model.arm :]])
 
     def finger(self, width: float) -> float:
         """Position of each finger joint [m, or rad] where the hand is `width` [m] open."""

@@ -18,7 +18,7 @@ from ompl import base, geometric, util
 
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError
-from pytest_simbench.motion.kinematics import straight_line, tool_path
+from pytest_simbench.motion.kinematics import DECIMALS, straight_line, tool_path
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.throw import Throw, feasible_swing, released
 from pytest_simbench.motion.timing import TICK, Timed, along_path, straight_move, synchronised_move
@@ -199,7 +199,8 @@ class MotionPlanner:
         beside = np.zeros((rows, len(robot.beside)))
         still = beside + robot.column("initial_position")[self.model.pin.nq :]
         parts = ((position, still), (velocity, beside), (effort, beside))
-        return Trajectory(TICK, *(np.hstack(part) for part in parts))
+        told = (np.hstack(p).round(n) + 0.0 for p, n in zip(parts, DECIMALS, strict=True))
+        return Trajectory(TICK, *told)
 
     def _search(self, start: FloatArray, goal: FloatArray, seed: int) -> FloatArray:
         """RRTConnect from start to goal, way points (n, arm)."""

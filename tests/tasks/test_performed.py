@@ -1,0 +1,153 @@
+"""What each task has a perfect hand do, and what it counts then, as approved: who changes a way, a
+wait or a count sees it here. What is right, the tests of each task say."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pytest_simbench.motion.registry import find
+from pytest_simbench.scene import FloatArray, Pose
+from pytest_simbench.tasks import (
+    Carrying,
+    Inserting,
+    Jitter,
+    Opening,
+    Pouring,
+    Pushing,
+    Stacking,
+    Throwing,
+)
+from pytest_simbench.tasks.base import Task
+from tests.approval import assert_approved
+from tests.tasks.flying import FlyingProcess
+from tests.tasks.scripted import Asked, ScriptedProcess, perform
+from tests.tasks.test_as_written import TASKS, words
+from tests.tasks.test_opening import PerfectHand
+
+NUMBER = re.compile(r"-?\d+\.\d+(e-?\d+)?|-?\d+e-?\d+")
+
+
+class Trembling(ScriptedProcess):
+    """Its bodies shake a little, each in its own way, walls push, and shapes are off."""
+
+    def do_misfit(self, names: list[str]) -> float:
+        return 2e-6 * len(names)
+
+    def do_contact_forces(self) -> list[tuple[str, str, Any]]:
+        names = [f"body/{body.name}" for body in self.scene.bodies]
+        names += ["link/panda_leftfinger", "link/panda_rightfinger", "ground"]
+        force = np.array([3.0, 0.5, 4.0 + math.sin(5 * self.time), 0.0, 0.01, 0.02])
+        return [(a, b, force * k) for k, (a, b) in enumerate(pairwise(names), 1)]
+
+    def _bodies(self) -> FloatArray:
+        rows = super()._bodies()
+        numbers = np.arange(len(rows))[:, None] + np.arange(3)
+        rows[:, :3] += 2e-4 * np.sin(3 * self.time + numbers)
+        rows[:, 7:10] += 6e-4 * np.cos(3 * self.time + numbers)
+        for k, row in enumerate(rows):
+            small = 1e-3 * (2 + math.sin(3 * self.time + k))
+            turn = Pose(
+                quaternion=(math.cos(small), 0.6 * math.sin(small), 0.0, 0.8 * math.sin(small))
+            )
+            row[3:7] = (Pose(quaternion=row[3:7]) * turn).quaternion
+        return rows
+
+
+def process_of(task: Task) -> ScriptedProcess:
+    """One whose hand can do what the task asks."""
+    if isinstance(task, Opening):
+        return PerfectHand()
+    return FlyingProcess() if isinstance(task, Throwing) else Trembling()
+
+
+def short(number: float) -> str:
+    return f"{round(number, 6) + 0.0:.5g}"
+
+
+def summary(rows: Any) -> str:
+    """Of numbers in time: sums by column with falling and with rising weights. These are
+    irrational, so that no sum is half of a last digit."""
+    rows = np.asarray(rows, float)
+    weights = np.sqrt(np.linspace(0.5, 1.5, len(rows))) / len(rows)
+    return " ".join(map(short, [*(weights[::-1] @ rows), *(weights @ rows)] if rows.size else []))
+
+
+def line(asked: Asked) -> str:
+    told = f"{asked.phase}: {asked.kind} at {asked.began:.6g} s for {asked.duration:.6g} s"
+    for name, value in asked.arguments.items():
+        if name in ("position", "velocity", "effort"):
+            told += f"\n  {name} {summary(value)}"
+        elif name != "duration":
+            told += f", {name} {value}"
+    return told
+
+
+def performed(task: Task, seed: int) -> Iterator[str]:
+    process = process_of(task)
+    try:
+        outcome, _ = perform(task, seed=seed, jitter=Jitter(0.001, 0.01), process=process)
+        end = [NUMBER.sub(lambda found: short(float(found[0])), words(vars(outcome)))]
+    except Exception as error:
+        end = [f"{type(error).__name__}: {error}"]
+    yield from dict.fromkeys(map(line, process.asked))
+    yield words({"counts": process.counts[-1:], "marks": process.marks})
+    yield from end
+
+
+def test_tasks_are_performed_so() -> None:
+    lines = []
+    for task in TASKS[:-3]:  # the last ask a policy
+        lines += [f"# {task.name}", *performed(task.smoke(), 7)]
+    assert_approved("performed", "\n".join(lines))
+
+
+ARMS = {
+    "ur5": (Stacking(), Throwing(), Pushing(), Carrying(), Inserting(), Pouring()),
+    "xarm7": (Stacking(), Throwing(), Pushing(), Carrying(), Inserting(), Pouring()),
+    "so101": (Throwing(), Pushing(), Pouring()),
+}
+
+
+@pytest.mark.parametrize("robot", ARMS)
+def test_other_arms_perform_so(robot: str) -> None:
+    lines = []
+    for task in ARMS[robot]:
+        lines += [f"# {task.name}", *performed(task.on(find(robot)).smoke(), 8)]
+    assert_approved(f"performed-{robot}", "\n".join(lines))
+
+
+def exact() -> str:
+    """A digest of all that arms are told, to the last bit."""
+    told = hashlib.sha256()
+    for task in (Stacking(), Throwing(), Pushing(), Carrying(), Inserting()):
+        process = process_of(task)
+        perform(task.smoke(), seed=7, jitter=Jitter(0.001, 0.01), process=process)
+        for asked in process.asked:
+            for values in asked.arguments.values():
+                told.update(np.asarray(values, float).tobytes())
+    return told.hexdigest()
+
+
+def test_all_processors_tell_an_arm_the_same() -> None:
+    """OpenBLAS has kernels for each kind, which differ in the last digits."""
+    code = "from tests.tasks.test_performed import exact; print(exact())"
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True,
+            cwd=Path(__file__).parents[2], env={**os.environ, "OPENBLAS_CORETYPE": kind},
+        ).stdout
+        for kind in ("Haswell", "SkylakeX", "Prescott")
+    }  # fmt: skip
+    assert len(found) == 1
