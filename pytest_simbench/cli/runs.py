@@ -216,7 +216,8 @@ def _show(
     recordings of the motions, where they are wanted; and print tables and problems."""
     report = Report.of(reading, outcome)
     written = Written(**vars(report)) if target is None else write_files(target, report, run)
-    lost = write_badge(Path(badge), reading.records, outcome.passed) if badge else ""
+    known = reading.records, outcome.passed, reading.claims
+    lost = write_badge(Path(badge), *known) if badge else ""
     problems += [*written.problems, lost]
     complete = written.complete and not lost
     if record and run is not None and target is not None:

@@ -105,6 +105,11 @@ def checked(operation: str, answer: Any) -> Any:
     return msgspec.convert(answer, ANSWERS[operation])
 
 
+def is_picture(drawn: np.ndarray, size: tuple[int, int]) -> bool:
+    """Whether it is one of `size` (width, height)."""
+    return drawn.dtype == np.uint8 and drawn.shape == (*size[::-1], 3)
+
+
 @dataclass(frozen=True)
 class Frame:
     """One picture of a film, or why there are no more.
@@ -129,7 +134,7 @@ class Frame:
             if "problem" in data:
                 return cls(time, None, readable(str(data["problem"])), 0.0)
             picture = unpack(data["picture"])
-            if picture.dtype == np.uint8 and picture.shape == (*size[::-1], 3):
+            if is_picture(picture, size):
                 return cls(time, picture, "", max(0.0, seconds) if math.isfinite(seconds) else 0.0)
             came = f"{picture.dtype} {picture.shape}"
         except (KeyError, TypeError, ValueError, AttributeError):

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.client.answers import Frame
+from pytest_simbench.client.answers import Frame, is_picture
 from pytest_simbench.client.closed_loop import Episode, Looking
-from pytest_simbench.client.errors import Diverged, EngineFailed, PolicyFailed
+from pytest_simbench.client.errors import BadState, Diverged, EngineFailed, PolicyFailed
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.stopwatch import Stopwatch
@@ -355,9 +355,14 @@ class World:
         return wrenches
 
     def render(self, width: int = 640, height: int = 480) -> NDArray[np.uint8]:
-        """An offscreen picture, (height, width, 3)."""
-        picture: NDArray[np.uint8] = self.process.request("render", width=width, height=height)
-        return picture
+        """An offscreen picture, (height, width, 3); a `BadState` where the engine drew none."""
+        drawn: NDArray[np.uint8] = self.process.request("render", width=width, height=height)
+        if not is_picture(drawn, (width, height)):
+            came = f"{drawn.dtype} {drawn.shape}"
+            raise BadState(
+                f"render: no picture, uint8 {(height, width, 3)}: {came}", self.process.where
+            )
+        return drawn
 
     def film(
         self, take: Callable[[Frame], None] | None, period: float, size: tuple[int, int]

@@ -8,6 +8,7 @@ from dataclasses import replace
 from math import inf, isfinite
 from typing import NoReturn
 
+from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval
 from pytest_simbench.measure.limits import check_threshold
 from pytest_simbench.measure.verdicts import (
@@ -314,6 +315,6 @@ class ResultSet:
 
 def _example(records: Sequence[Record]) -> str:
     first = records[0]
-    message = first.error.message if first.error else ""
+    message = in_one_line(first.error.message) if first.error else ""
     place = f"repetition {first.repetition}, seed {first.seed}"
     return f" ({place}: {message})" if message else f" ({place})"

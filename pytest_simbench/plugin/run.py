@@ -325,7 +325,7 @@ class Run:
             reporter.write_line(text)
         lost = [write_outcome(path, outcome)]
         if badge := options.value(self.config, "sim_badge"):
-            lost.append(write_badge(Path(badge), records, passed))
+            lost.append(write_badge(Path(badge), records, passed, self.reading.claims))
         whole = written.complete and made[1] and not unsaved
         self.unwritten = not whole or any([*lost, *self.told.values()])
         problems += [*lost, *made[0]]

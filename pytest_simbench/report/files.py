@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pytest_simbench.ground.text import for_csv, for_terminal
+from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.configuration import task_parameters
 from pytest_simbench.records.metrics import COSTS
 from pytest_simbench.records.paths import write_whole
@@ -152,9 +153,11 @@ def write_outcome(folder: Path, outcome: RunOutcome) -> str:
     return _written(folder, OUTCOME, outcome.to_json())
 
 
-def write_badge(path: Path, records: Sequence[Record], passed: bool | None) -> str:
+def write_badge(
+    path: Path, records: Sequence[Record], passed: bool | None, claims: Sequence[Claim]
+) -> str:
     """Write the badge of a run; a sentence when it could not be written."""
-    failed = _written(path.parent, path.name, badge(records, passed))
+    failed = _written(path.parent, path.name, badge(records, passed, claims))
     return f"no badge: {failed}" if failed else ""
 
 

@@ -51,6 +51,15 @@ class Start(Wire):
     efforts: tuple[float, ...] = ()
 
 
+WORDS = {
+    "box", "sphere", "cylinder", "capsule", "convex_mesh", "compound", "file", "frictions",
+    "restitution", "damping", "wrench", "prescribed", "loop", "self_collide", "apart", "coupling",
+    "passive_damping", "joint_friction", "spring", "motor", "link_gravity",
+}  # fmt: skip
+"""What a scene may have: kinds of bodies, `file` (it is read from one), several frictions; from
+`coupling` on of joints (`link_gravity`: a share of it)."""
+
+
 @dataclass(frozen=True)
 class Scene(Wire):
     """Bodies, robot and gravity above an endless ground plane at z = 0.
@@ -177,10 +186,7 @@ class Scene(Wire):
 
     @cached_property
     def words(self) -> frozenset[str]:
-        """What is in it: `box`, `sphere`, `cylinder`, `capsule`, `convex_mesh`, `compound`,
-        `file` (read from one), `frictions` (several), `restitution`, `damping`, `wrench`,
-        `prescribed`, `loop`, `self_collide`, `apart`, and of joints `coupling`, `passive_damping`,
-        `joint_friction`, `spring`, `motor`, `link_gravity` (a share of it)."""
+        """What is in it, of `WORDS`."""
         bodies = self.bodies
         joints = () if self.robot is None else self.robot.joints
         found = {

@@ -13,6 +13,8 @@ from pathlib import Path
 from pytest_simbench.ground.errors import NotSupportedError, SimulatorError
 from pytest_simbench.ground.versions import BUILD, VersionedName, release_numbers
 from pytest_simbench.scene import Robot, Scene
+from pytest_simbench.scene.friction import RULES
+from pytest_simbench.scene.scene import WORDS
 
 
 class Capability(StrEnum):
@@ -78,6 +80,11 @@ class Deviation:
     within: float | None = None
     elsewhere: float | None = None
     only: str = ""
+
+    def __post_init__(self) -> None:
+        if self.only and self.only not in WORDS:
+            told = f"a deviation counts only in scenes with {self.only!r}, which none has"
+            raise SimulatorError(f"{told}; choose from {', '.join(sorted(WORDS))}")
 
     def concerns(self, scene: Scene) -> bool:
         """Whether it counts in this scene."""
@@ -180,6 +187,18 @@ class SimulatorInfo:
     friction_rule: str = ""
     reads: tuple[str, ...] = ()
     program: tuple[str, str] = ("", "")
+
+    def __post_init__(self) -> None:
+        for name in ("modules", "deviations", "requirements", "system_packages", "reads"):
+            value, kind = getattr(self, name), Deviation if name == "deviations" else str
+            if not (isinstance(value, tuple) and all(isinstance(item, kind) for item in value)):
+                told = f"a tuple of {kind.__name__}, not {value!r:.60}"
+                raise SimulatorError(f"info.{name} of {self.name}: give {told}")
+        if not all(isinstance(item, Capability) for item in self.capabilities):
+            raise SimulatorError(f"info.capabilities of {self.name}: give Capability.named('...')")
+        if self.friction_rule and self.friction_rule not in RULES:
+            told = f"{self.friction_rule!r} is none; choose from {', '.join(RULES)}"
+            raise SimulatorError(f"info.friction_rule of {self.name}: {told}")
 
     @property
     def no_program(self) -> str:

@@ -15,7 +15,7 @@ from pytest_simbench.ground.versions import VersionedName, base_name
 from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.simulator.base import Simulator
 from pytest_simbench.simulator.info import SimulatorInfo
-from pytest_simbench.simulator.settings import Settings, changed, profile
+from pytest_simbench.simulator.settings import Settings, changed, flaw, profile
 
 GROUP = "pytest_simbench.simulators"
 """Entry-point group in which adapters register, `name = "package.module:Class"`."""
@@ -166,6 +166,10 @@ def adapter(name: str) -> type[Simulator]:
         raise SimulatorError(f"{whose} has no SimulatorInfo in its attribute info")
     if not (isinstance(getattr(cls, "profiles", None), Mapping) and cls.profiles):
         raise SimulatorError(f"{whose} has no settings in its attribute profiles")
+    if cls.info.name != name:
+        raise SimulatorError(f"{whose} says in its info that its name is {cls.info.name!r}")
+    if wrong := flaw(cls.profiles):
+        raise SimulatorError(f"{whose} has wrong settings: {wrong}")
     return cls
 
 

@@ -63,6 +63,18 @@ def profile(profiles: Mapping[str, S], name: str, simulator: str) -> S:
     return profiles[name]
 
 
+def flaw(profiles: Mapping[str, Any]) -> str:
+    """What is wrong with the profiles of an adapter, in one sentence; empty where nothing is."""
+    for name, settings in profiles.items():
+        kind = type(settings)
+        if not isinstance(settings, Settings):
+            return f"profile {name!r} is no instance of a class of Settings: {settings!r:.60}"
+        if "__dataclass_fields__" not in vars(kind):
+            told = f"what {kind.__name__} sets counts in a dataclass alone"
+            return f"{told}: write @dataclass(frozen=True) above it"
+    return ""
+
+
 def changed(settings: S, changes: Mapping[str, Any], simulator: str) -> S:
     """The settings with single values changed; texts are converted to each field's type.
 

@@ -18,8 +18,7 @@ from pytest_simbench.ground.versions import base_name
 from pytest_simbench.laws.free import rotation_of
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import Trajectory
-from pytest_simbench.simulator import Capability, Settings
-from pytest_simbench.simulator.settings import changed
+from pytest_simbench.simulator.settings import changed, flaw
 from pytest_simbench.testing import scenes
 from pytest_simbench.testing.kit import any_robot, check
 from pytest_simbench.testing.subject import Subject, require, require_close
@@ -88,8 +87,6 @@ def info_complete(subject: Subject) -> None:
         require(getattr(info, text).strip(), f"info.{text} is empty")
     told = info.modules or all(info.program)
     require(told, "info.modules is empty: nothing tells whether the engine is here")
-    unknown = [c for c in info.capabilities if not isinstance(c, Capability)]
-    require(not unknown, f"info.capabilities has unknown entries {unknown}")
     silent = [d.quantity for d in info.deviations if not d.reason.strip()]
     require(not silent, f"deviations without a reason: {silent}")
 
@@ -100,8 +97,8 @@ def profiles_complete(subject: Subject) -> None:
     cls = subject.cls
     missing = {"default", "tuned"} - set(cls.profiles)
     require(not missing, f"profiles lack {sorted(missing)}")
+    require(not flaw(cls.profiles), flaw(cls.profiles))
     for name, settings in cls.profiles.items():
-        require(isinstance(settings, Settings), f"profile {name} is no Settings")
         require(settings.timestep > 0, f"profile {name} has timestep {settings.timestep}")
         values = {f.name: getattr(settings, f.name) for f in dataclasses.fields(settings)}
         require(changed(settings, values, cls.info.name) == settings, f"profile {name} changes")

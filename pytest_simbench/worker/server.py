@@ -34,6 +34,7 @@ from pytest_simbench.scene.pair_friction import combined
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.info import alternatives, check_supported, importable
 from pytest_simbench.simulator.settings import changed
+from pytest_simbench.simulator.settings import profile as profile_of
 from pytest_simbench.worker.loop import Loop, told_forces
 from pytest_simbench.worker.loop import inside as run_inside
 from pytest_simbench.worker.loop import outside as run_outside
@@ -125,7 +126,7 @@ class Server:
             for variable, value in cls.info.environment.items():
                 os.environ.setdefault(variable, value)
         _import_engine(cls.info)
-        settings = changed(cls.profiles[profile], changes, cls.info.name)
+        settings = changed(profile_of(cls.profiles, profile, cls.info.name), changes, cls.info.name)
         if self.simulator is not None:
             self.simulator.close()  # a reused worker starts each world anew
         self.stepper = None

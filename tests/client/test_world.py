@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.client.answers import Frame
-from pytest_simbench.client.errors import Diverged, Where
+from pytest_simbench.client.errors import BadState, Diverged, Where
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.tape import ARRAYS, Latency, Operation
@@ -25,6 +25,7 @@ from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.scene import Pose, Scene, SceneError, Sphere, Trajectory
 from pytest_simbench.tasks.base import cube
 from pytest_simbench.worker.wire import pack
+from tests.tasks.scripted import ScriptedProcess
 
 SCENE = Scene("s", (cube("a", Pose.at(0.0, 0.0, 2.0), (1.0,) * 4),))
 
@@ -287,3 +288,11 @@ def test_operations_travel_as_json_to_the_last_bit() -> None:
         for name, value in operation.arguments.items():
             np.testing.assert_array_equal(again.arguments[name], value)
         assert again.duration == operation.duration
+
+
+@pytest.mark.parametrize("drawn", [np.zeros((4, 3, 3), np.uint8), np.zeros((3, 4, 3))])
+def test_what_is_no_picture_is_refused(drawn: np.ndarray) -> None:
+    process: Any = ScriptedProcess()
+    process.do_render = lambda width, height: drawn
+    with pytest.raises(BadState, match="render: no picture"):
+        World(process, Scene("empty")).render(4, 3)

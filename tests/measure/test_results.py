@@ -13,6 +13,7 @@ from pytest_simbench.measure.intervals import interval, proportion
 from pytest_simbench.measure.results import InconclusiveWarning, ResultSet
 from pytest_simbench.measure.verdicts import at_least
 from pytest_simbench.records.metrics import CRASHED, Metric, UnknownMetric
+from pytest_simbench.records.record import Failure
 from tests.records.build import METRICS, failed, record, records
 
 
@@ -315,3 +316,9 @@ def test_a_claim_of_no_crashes_is_told_whether_it_held_or_not() -> None:
     fine.assert_no_crashes()
     verdicts = [judged.verdict for of in (crashed, fine) for _, judged in of.judged]
     assert verdicts == ["refuted", "supported"]  # that it held was not told
+
+
+def test_what_an_engine_says_in_two_lines_is_told_in_one() -> None:
+    died = replace(failed(1), error=Failure("EngineFailed", "no world\nof two lines", "load"))
+    with pytest.raises(AssertionError, match="no world of two lines"):
+        ResultSet([died], METRICS).check_crashes(0.0)

@@ -14,7 +14,7 @@ import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
 from pytest_simbench.records.baseline import read_baseline
-from tests.plugin.inner import run_before, run_pytest
+from tests.plugin.inner import FALLING, run_before, run_pytest
 
 TEST = """
     import os
@@ -195,3 +195,18 @@ def test_junit_has_a_property_for_each_metric(
     names = [str(item.get("name")) for item in tree.iter("property")]
     assert len({*names}) == len(names)
     assert {"falling 1: landed", "falling 2: landed"} <= {*names}
+
+
+def test_a_claim_that_is_known_to_fail_does_so_in_junit_and_on_a_badge(
+    pytester: pytest.Pytester,
+) -> None:
+    claiming = FALLING.rstrip().replace("()", "(0.05)") + '.assert_at_least("landed", 0.9)\n'
+    pytester.makepyfile(claiming.replace("def ", "import pytest\n@pytest.mark.xfail\ndef "))
+    told = "--sim=mujoco --reps=8 --junitxml=junit.xml --sim-badge=badge.json"
+    run_pytest(pytester, told, xfailed=1)
+    found = ElementTree.parse(pytester.path / "junit.xml").iter("property")
+    claimed = [item.get("value") for item in found if "claim " in str(item.get("name"))]
+    assert claimed == ["XFAIL"]
+    badge = (pytester.path / "badge.json").read_text()
+    assert "1 of 1 claims known to fail" in badge
+    assert "yellow" in badge

@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from pytest_simbench.simulator import NotSupportedError
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
 
 class Good(MuJoCo):
     info = replace(MuJoCo.info, name="good", title="Good")
@@ -50,6 +51,17 @@ class NoInfo(MuJoCo):
 
 class NoProfiles(MuJoCo):
     profiles = None
+
+class Dicts(Good):
+    info = replace(Good.info, name="broken09")
+    profiles = {"default": {"timestep": 0.002}}
+
+class Own(MuJoCoSettings):
+    timestep: float = 0.004
+
+class Undecorated(Good):
+    info = replace(Good.info, name="broken10")
+    profiles = {"default": Own()}
 """
 
 
@@ -75,12 +87,15 @@ BROKEN = {
     "good_adapter:NoInfo": "has no SimulatorInfo in its attribute info",
     "good_adapter:NoProfiles": "has no settings in its attribute profiles",
     "!!": "does not import: *",
+    "good_adapter:Dicts": "has wrong settings: profile 'default' is no instance of *",
+    "good_adapter:Undecorated": "has wrong settings: what Own sets counts in a dataclass alone: *",
+    "good_adapter:Good": "says in its info that its name is 'good'",
 }
 
 
 def test_broken_adapters_end_no_other(pytester: pytest.Pytester, site: Path) -> None:
     """All kinds at once: each is told with its reason, and is an error only when it is named."""
-    names = {f"broken{number}": value for number, value in enumerate(BROKEN)}
+    names = {f"broken{number:02}": value for number, value in enumerate(BROKEN)}
     entries = [f"{name} = {value}" for name, value in names.items()]
     distribution(site, "broken-sims", "\n".join([*entries, "good = good_adapter:Good"]))
     said = {
@@ -95,8 +110,8 @@ def test_broken_adapters_end_no_other(pytester: pytest.Pytester, site: Path) -> 
     result.stdout.fnmatch_lines(["*::test_falling?good-headless?", "*?mujoco-headless?"])
     assert "broken" not in result.stdout.str().replace("test_broken", "")
     run_pytest(pytester, "--sim=good --reps=1", passed=1)
-    result = run_pytest(pytester, "--sim=broken3")
-    usage_error(result, f"ERROR: {said['broken3']}")
+    result = run_pytest(pytester, "--sim=broken03")
+    usage_error(result, f"ERROR: {said['broken03']}")
 
 
 def test_all_skips_a_broken_one_with_its_reason(pytester: pytest.Pytester, site: Path) -> None:

@@ -201,19 +201,19 @@ ONE_FAILED = [*FINE, failed("WorkerDied", "load", "gone", repetition=11)]
 def test_message_and_colour_of_the_badge(
     records: list[Record], passed: bool | None, message: str, colour: str, tmp_path: Path
 ) -> None:
-    assert write_badge(tmp_path / "new" / "badge.json", records, passed) == ""
+    assert write_badge(tmp_path / "new" / "badge.json", records, passed, ()) == ""
     assert json.loads((tmp_path / "new" / "badge.json").read_text()) == {
         "schemaVersion": 1,
         "label": "simulators",
         "message": message,
         "color": colour,
     }
-    assert write_badge(tmp_path / "new", records, passed).startswith("no badge: ")
+    assert write_badge(tmp_path / "new", records, passed, ()).startswith("no badge: ")
 
 
 @pytest.mark.parametrize("text", HOSTILE, ids=lambda text: ascii(text)[:20])
 def test_a_name_on_a_badge_is_short_plain_text(text: str) -> None:
-    message = json.loads(badge([record(text)], True))["message"]
+    message = json.loads(badge([record(text)], True, ()))["message"]
     assert_harmless_terminal(message)
     assert len(message) <= 60
 

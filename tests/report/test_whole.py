@@ -177,7 +177,7 @@ def test_a_whole_report(
         *written.problems,
         *((tmp_path / name).read_text() for name in ("report.md", "report.csv", "outcome.json")),
         *terminal(report, tmp_path, 80), *terminal(report, tmp_path, 130),
-        badge(report.records, outcome.passed),
+        badge(report.records, outcome.passed, reading.claims),
         FLAT.sub(lambda m: " ".join(m[0].split()), shown),
     ]  # fmt: skip
     assert_approved(f"report-{run.__name__}", "\n".join(texts).replace(str(tmp_path), "RUN"))

@@ -102,6 +102,8 @@ def test_an_adapter_gets_its_settings(ask: Asked) -> None:
     assert ask.construct(profile="default")["settings"] == {"timestep": 0.002, "stiffness": 1.0}
     kind, message = ask.error("construct", **{**CONSTRUCT, "changes": {"speed": 1}})
     assert (kind, message[:31]) == ("SettingsError", "hosted has no setting 'speed'; ")
+    kind, message = ask.error("construct", **{**CONSTRUCT, "profile": "fast"})
+    assert message.startswith("hosted has no settings profile 'fast'; choose from default, ")
 
 
 def test_a_window_shows_the_world_and_gets_no_variables(ask: Asked) -> None:

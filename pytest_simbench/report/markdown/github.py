@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pytest_simbench.ground.text import in_one_line
+from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.record import Record
 
 VARIABLE = "GITHUB_STEP_SUMMARY"
@@ -44,10 +45,11 @@ LONGEST = 60
 """Characters of the message."""
 
 
-def badge(records: Sequence[Record], passed: bool | None) -> str:
+def badge(records: Sequence[Record], passed: bool | None, claims: Sequence[Claim]) -> str:
     """The badge of a run, as JSON.
 
-    Green: every test passed and no repetition crashed. Yellow: the tests passed although some did.
+    Green: every test passed and no repetition crashed. Yellow: some did, or a claim failed as
+    expected.
     Red: a test or a limit failed. Grey: nothing was measured, or it is not known what passed.
     Interrupted repetitions say nothing.
     """
@@ -55,6 +57,7 @@ def badge(records: Sequence[Record], passed: bool | None) -> str:
     failed = sum(not record.ok for record in ended)
     names = list(dict.fromkeys(record.simulator for record in ended))
     who = names[0] if len(names) == 1 else f"{len(names)} simulators"
+    verdicts = [claim.verdict for claim in {claim.identity: claim for claim in claims}.values()]
     if not ended:
         message, colour = "nothing measured", "lightgrey"
     elif passed is None:
@@ -63,6 +66,8 @@ def badge(records: Sequence[Record], passed: bool | None) -> str:
         message, colour = f"{who}: failing", "red"
     elif failed:
         message, colour = f"{who}: {failed} of {len(ended)} repetitions crashed", "yellow"
+    elif known := verdicts.count("XFAIL"):
+        message, colour = f"{who}: {known} of {len(verdicts)} claims known to fail", "yellow"
     else:
         message, colour = f"{who}: {len(ended)} repetitions passed", "brightgreen"
     data = {
