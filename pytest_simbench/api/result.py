@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from pytest_simbench.cli.runs import text_of
-from pytest_simbench.cli.values import BadInput, refusing
+from pytest_simbench.cli.values import BadInput, expect, refusing
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.gate import gate_runs
 from pytest_simbench.records.baseline import BaselineError, read_baseline
@@ -94,9 +95,12 @@ class Run:
         """
         if earlier is None:
             return Shown.of(map(tables.compared, self._report.tasks))
+        expect("earlier", earlier, (Run, str, PathLike), "give a run, or the path of one")
         with refusing(BaselineError):
             before = earlier.contents if isinstance(earlier, Run) else read_baseline(Path(earlier))
-        return Shown.of([changes.section(before.name, gate_runs(before, self.contents))])
+        found = changes.section(before.name, gate_runs(before, self.contents))
+        notes = dict.fromkeys([*before.problems, *self.problems, *found.notes])
+        return Shown.of([replace(found, notes=list(notes))])
 
     def report(self, path: str | Path | None = None) -> Path:
         """Write the report, and return the path of its page.
@@ -108,6 +112,8 @@ class Run:
         Raises:
             BadInput: it cannot be written.
         """
+        if path is not None:
+            expect("path", path, (str, PathLike), "give the path of a page or of a folder")
         target = self.folder if path is None else Path(path)
         if target.suffix == ".html":
             problem, page = write_page(target, self._report, self.folder), target
@@ -134,6 +140,7 @@ def load(folder: str | Path) -> Run:
     Raises:
         BadInput: there is none, or it cannot be read.
     """
+    expect("folder", folder, (str, PathLike), "give the path of a run")
     place = RunFolder.of(Path(folder))
     with refusing(RecordError):
         contents = place.read()

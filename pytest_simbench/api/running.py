@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from pytest_simbench.cli.selection import (
     profiles_of,
     robots_of,
 )
-from pytest_simbench.cli.values import BadInput, BadValue, refusing
+from pytest_simbench.cli.values import BadInput, BadValue, expect, refusing
 from pytest_simbench.client.display import Displays
 from pytest_simbench.client.errors import DisplayError, ExecutorError, Unavailable, WorldParityError
 from pytest_simbench.experiment.case import PROTOCOLS
@@ -149,12 +150,16 @@ def _chosen(
     gui: bool,
 ) -> Selection:
     """What is asked for, checked."""
+    expect("simulators", simulators, Iterable, "give names of simulators, or leave it out")
     text = simulators if isinstance(simulators, str) else ",".join(map(str, simulators))
     asked = _read("simulators", text, read.simulators)
+    example: dict[str, Any] = {asked[0]: {"timestep": 0.001}}
+    by_name = "give those of each simulator by its name"
+    expect("settings", settings or {}, Mapping, f"{by_name}, for instance {example}")
     for name, changes in (settings or {}).items():
         if not isinstance(changes, Mapping):
             example = {asked[0]: {name: changes}}
-            raise BadInput(f"settings: give those of each simulator by its name: {example}")
+            raise BadInput(f"settings: {by_name}: {example}")
     with refusing(SimulatorError):
         names, builds = read_names([name for name in asked if name != EVERY], Path.cwd())
         profiles, files = profiles_of(_read("profile", profile, read.profiles))
@@ -198,6 +203,7 @@ def _experiments(
 
 def _locked(folder: str | Path | None, resume: bool) -> RunFolder:
     """The folder of the run, this process's own; complains of one that holds another run."""
+    expect("folder", folder or "", (str, PathLike), "give the path of a folder, or leave it out")
     path = Path(folder) if folder else None  # empty: the default, as on pytest's command line
     with refusing((FolderError, NotResumed)):
         found = run_to_resume(path, Path(RUNS)) if resume else path or new_name(Path(RUNS))

@@ -100,13 +100,11 @@ def _merged(readings: dict[str, RunContents]) -> tuple[list[Merged], RunContents
     """The records of runs as those of one: with where each comes from, and to be shown.
 
     Raises:
-        BadInput: they are not parts of one run, or hold nothing.
+        BadInput: they are not parts of one run, or one holds nothing.
     """
     with refusing(MergeError):
         records = merge({name: found.records for name, found in readings.items()})
         tasks = merge_tasks({name: found.tasks for name, found in readings.items()})
-    if not records:
-        raise BadInput("none of the runs holds a repetition that ended")
     return records, RunContents(records=tuple(item.record for item in records), tasks=tasks)
 
 

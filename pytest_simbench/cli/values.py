@@ -62,6 +62,16 @@ class BadValue(BadInput, argparse.ArgumentTypeError):
         return f"{name}={shown(self.text)}: {self.advice}"
 
 
+def expect(name: str, value: object, kinds: type | tuple[type, ...], advice: str) -> None:
+    """Check the type of an argument of the Python API.
+
+    Raises:
+        BadInput: it is of none of these types.
+    """
+    if not isinstance(value, kinds):
+        raise BadInput(BadValue(value, advice).sentence(name))
+
+
 @contextmanager
 def refusing(
     errors: type[Exception] | tuple[type[Exception], ...],

@@ -208,7 +208,10 @@ def checked(action: Any, space: Any) -> FloatArray:
     Raises:
         InvalidAction: of another shape, or not finite.
     """
-    found = np.asarray(action, dtype=float)
+    try:
+        found = np.asarray(action, dtype=float)
+    except (TypeError, ValueError):  # no numbers, or rows of several lengths
+        found = np.empty(0)
     if found.shape != space.shape or not np.isfinite(found).all():
         raise InvalidAction(
             f"an action is finite numbers of shape {space.shape}, not {action!r:.80}"

@@ -9,6 +9,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.error import ClosedEnvironmentError
 from gymnasium.vector import SyncVectorEnv
 
 from pytest_simbench.gym.env import TaskEnv, checked
@@ -53,19 +54,35 @@ class TaskVectorEnv(SyncVectorEnv):
         self._over: Any = np.zeros(self.num_envs, bool)
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> Any:
-        """All anew; a number is the first one's seed, and the others have those that follow."""
+        """All anew; a number is the first one's seed, and the others have those that follow.
+
+        Raises:
+            ClosedEnvironmentError: they are closed.
+            ValueError: another number of seeds than of environments.
+        """
+        self._check_open()
         if seed is None or isinstance(seed, int | np.integer):
             seed = [None if seed is None else int(seed) + k for k in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(
+                f"seed={seed!r:.80}: give one number, or one for each of {self.num_envs} "
+                "environments"
+            )
         for k in np.flatnonzero((options or {}).get("reset_mask", np.ones(self.num_envs))):
             self.envs[k].begin("reset", seed=seed[k], options=options)
             self._over[k] = False
         return super().reset(seed=seed, options=options)
 
     def step(self, actions: Any) -> Any:
-        """One period in each; errors as `TaskEnv.step`."""
+        """One period in each; errors as `TaskEnv.step`, and ClosedEnvironmentError."""
+        self._check_open()
         rows = checked(actions, self.action_space)
         for env, over, row in zip(self.envs, self._over, rows, strict=True):
             env.begin("reset") if over else env.begin("step", row)
         result = super().step(rows)
         self._over = result[2] | result[3]
         return result
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError("these environments are closed: make new ones")

@@ -34,7 +34,7 @@ from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import POWER, compared, without_speed
 from pytest_simbench.records.configuration import differences, other_meanings
 from pytest_simbench.records.folder import RunContents
-from pytest_simbench.records.metrics import CRASHED, Metric
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import RowKey, by_test, grouped
 
@@ -80,6 +80,12 @@ class Change:
         """Whether so many repetitions can change as much by chance, and seldom: not one value that
         all repetitions have, which is certain, and not so few that nothing is ever seldom."""
         return 0 < _smallest_p(self.comparison) <= ALPHA
+
+    @property
+    def visible(self) -> bool:
+        """Whether an outcome changed by what means anything, if by chance; costs always vary."""
+        means = self.comparison.first, self.comparison.second
+        return self.metric not in COSTS and self.metric.differs(*means)
 
     @property
     def repetitions(self) -> str:
@@ -211,6 +217,15 @@ def run_gate(
         for change in changes
         if _smallest_p(change.comparison) * number > ALPHA * share
     ]
+    number = max(1, sum(change.by_chance for change in others))
+    seen = [change for change in others if change.visible]
+    most = min(seen, key=lambda change: _smallest_p(change.comparison), default=None)
+    # Twice as large a p value: it is of both directions.
+    if most and not most.significant and 2 * _smallest_p(most.comparison) * number > ALPHA:
+        notes.append(
+            f"metrics without a limit: {most.repetitions} are too few for a change to be "
+            f"significant among {number} comparisons"
+        )
     named = differences({test: (before[test].records, after[test].records) for test in common})
     return GateReport(
         tuple(named),

@@ -33,9 +33,13 @@ def merge(runs: Mapping[str, Sequence[Record]]) -> list[Merged]:
     that leaves them apart: it depends on where pytest ran.
 
     Raises:
-        MergeError: a seed is there twice, or settings or versions differ.
+        MergeError: a run holds no repetition that ended, a seed is there twice, or settings or
+            versions differ.
     """
     ended = [[r for r in run if r.status != "interrupted"] for run in runs.values()]
+    for name, run in zip(runs, ended, strict=True):
+        if not run:
+            raise MergeError(f"{name} holds no repetition that ended: leave it out")
     tests: dict[str, dict[str, list[Record]]] = {}
     # A test may repeat several tasks, which their parameters tell apart.
     sides = by_test(ended, lambda records: list(grouped(records, task_parameters).values()))

@@ -81,6 +81,10 @@ def test_a_run_is_compared_with_an_earlier_one(write: Write) -> None:
     assert "not significantly more repetitions crashed" in str(now.compare(before))
     with pytest.raises(simbench.BadInput, match="there is no baseline nowhere; give a run folder"):
         now.compare("nowhere")
+    with pytest.raises(
+        simbench.BadInput, match="^earlier=Record.*: give a run, or the path of one$"
+    ):
+        now.compare(before.contents.records[0])  # type: ignore[arg-type]
 
 
 def test_records_have_the_columns_of_the_csv_file(write: Write) -> None:
@@ -115,6 +119,8 @@ def test_the_report_is_a_page_or_all_files(write: Write, tmp_path: Path) -> None
     for path in (tmp_path / "file" / "page.html", tmp_path / "file"):
         with pytest.raises(simbench.BadInput, match="file"):
             run.report(path)
+    with pytest.raises(simbench.BadInput, match="^path=7: give the path of a page or of a folder$"):
+        run.report(7)  # type: ignore[arg-type]
 
 
 def test_a_folder_that_is_no_run_is_one_sentence(tmp_path: Path) -> None:
@@ -126,13 +132,19 @@ def test_a_folder_that_is_no_run_is_one_sentence(tmp_path: Path) -> None:
     (tmp_path / "records.jsonl").write_text("no JSON\n")
     with pytest.raises(simbench.BadInput, match="records.jsonl:1: not JSON"):
         simbench.load(tmp_path)
+    with pytest.raises(simbench.BadInput, match="^folder=None: give the path of a run$"):
+        simbench.load(None)  # type: ignore[arg-type]
 
 
 def test_what_is_damaged_is_told(write: Write) -> None:
-    run = write("run")
+    run, other = write("run"), write("other")
     with (run.folder / "records.jsonl").open("a") as file:
         file.write("half a line\n")
-    assert "damaged" in str(simbench.load(run.folder).table())
+    damaged = simbench.load(run.folder)
+    assert "damaged" in str(damaged.table())
+    for shown in (other.compare(run.folder), other.compare(damaged), damaged.compare(other)):
+        assert " ".join(str(shown).split()).count("damaged and left out") == 1
+        assert "damaged and left out" in shown.html
 
 
 def test_a_notebook_rewrites_the_line_of_progress(

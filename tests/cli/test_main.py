@@ -87,7 +87,7 @@ def test_help_loads_nothing_large() -> None:
         ("merge a a", "simbench merge: a: the run is given twice"),
         ("merge a b", "simbench merge: a and b overlap: both have seed 2022 of *"),
         ("merge a --output b", "simbench merge: b already holds a run; give another --output"),
-        ("merge empty", "simbench merge: none of the runs holds a repetition that ended"),
+        ("merge empty", "simbench merge: empty holds no repetition that ended: leave it out"),
         ("report none", "simbench report: none: cannot read records from *No such file*"),
         ("report empty", "simbench report: empty: it holds no repetition"),
         ("report bad", "simbench report: bad: bad/records.jsonl:1: not JSON*"),

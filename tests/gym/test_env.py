@@ -18,7 +18,7 @@ import gymnasium
 import numpy as np
 import psutil
 import pytest
-from gymnasium.error import InvalidAction, ResetNeeded, UnsupportedMode
+from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded, UnsupportedMode
 from gymnasium.utils.env_checker import check_env
 
 import pytest_simbench
@@ -270,7 +270,22 @@ def test_what_is_asked_too_early_is_refused() -> None:
     told = "^make the environment with render_mode='rgb_array' for pictures$"
     with pytest.raises(UnsupportedMode, match=told):
         env.render()
+    for wrong in ("up", [[1.0], [1.0, 2.0]], np.zeros(4)):
+        with pytest.raises(InvalidAction, match=r"^an action is finite numbers of shape \(5,\)"):
+            checked(wrong, env.action_space)
     env.close()  # nothing to close
+
+
+def test_side_by_side_nothing_begins_with_too_few_seeds_or_once_closed() -> None:
+    envs = make_vec("pushing", "mujoco", 2, python="p")
+    for seeds in ([1], [1, 2, 3]):
+        with pytest.raises(ValueError, match="^seed=.*: give one number, or one for each of 2 env"):
+            envs.reset(seed=seeds)
+    assert not any(hasattr(env, "coming") for env in envs.envs)
+    envs.close()
+    for ask in (envs.reset, lambda: envs.step(np.zeros((2, 5)))):
+        with pytest.raises(ClosedEnvironmentError, match="^these environments are closed: make"):
+            ask()
 
 
 @pytest.mark.parametrize(

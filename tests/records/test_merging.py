@@ -34,7 +34,14 @@ def test_shards_in_any_order_make_the_straight_run(cuts: list[int], seed: int) -
     ends = [0, *sorted(cuts), 30]
     parts = [(f"run {i}", shard(whole, a, b)) for i, (a, b) in enumerate(pairwise(ends))]
     Random(seed).shuffle(parts)
-    assert [item.record for item in merge(dict(parts))] == whole
+    assert [item.record for item in merge({name: part for name, part in parts if part})] == whole
+
+
+@pytest.mark.parametrize("status", [None, "interrupted"])
+def test_a_part_without_a_repetition_is_refused(status: str | None) -> None:
+    part = [replace(r, status=status) for r in straight(1) if status]
+    with pytest.raises(MergeError, match="^b holds no repetition that ended"):
+        merge({"a": straight(3), "b": part})
 
 
 def test_each_record_tells_where_its_files_are() -> None:

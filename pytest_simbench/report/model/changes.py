@@ -16,7 +16,8 @@ NO_LIMIT = "not significantly more repetitions crashed; no other limit was teste
 
 
 def columns(report: GateReport) -> list[Column]:
-    """One line for each metric with a limit, each of the study's, and each that clearly changed."""
+    """One line for each metric with a limit, each of the study's, each outcome that changed, and
+    each cost that clearly did."""
     rows = _rows(report)
     if not rows:
         return []
@@ -42,7 +43,10 @@ def _rows(report: GateReport) -> list[tuple[Change, str]]:
     found += [
         (change, _free(change))
         for change in report.others
-        if _free(change) != UNCLEAR or change.metric.study or change.metric.name in ALWAYS
+        if _free(change) != UNCLEAR
+        or change.visible
+        or change.metric.study
+        or change.metric.name in ALWAYS
     ]
     tests = list(dict.fromkeys(change.test for change, _ in found))
     return sorted(found, key=lambda row: tests.index(row[0].test))

@@ -57,7 +57,9 @@ def test_a_change_without_a_limit_is_called_worse_or_better_only_when_it_is_sure
     assert line(worse, "untouched_moved").endswith("worse")
     few = replace(made(1.0, 0.0)[0], metrics={"placed": 1.0, "untouched_moved": 1.0})
     chance = render_changes(compared([few, *made(1.0, 0.0)[1:]]), 120, False)
-    assert "untouched_moved" not in chance  # neither of the study's metrics nor a clear change
+    assert line(chance, "untouched_moved").endswith("no clear change")  # a reader sees it change
+    assert "too few" not in chance
+    assert "untouched_moved" not in render_changes(compared(made(1.0, 0.0)), 120, False)
     assert "passed" not in worse + chance
     error = Metric("error", "error", "m", "lower", study=True)  # and never for rounding
     sides = [
@@ -65,6 +67,18 @@ def test_a_change_without_a_limit_is_called_worse_or_better_only_when_it_is_sure
     ]
     tiny = render_changes(run_gate(*sides, (), {"stacking": (error,)}), 120, False)
     assert line(tiny, "error").endswith("no clear change")
+
+
+@pytest.mark.parametrize(
+    ("number", "told"), [(1, "1 and 1 repetitions are"), (6, "6 pairs are"), (12, "")]
+)
+def test_too_few_repetitions_hide_no_change_and_are_told_once(number: int, told: str) -> None:
+    report = run_gate(made(1.0, 0.0)[:number], made(0.5, 3.0)[:number], (), METRICS)
+    text = render_changes(report, 120, False)
+    for metric in ("placed", "untouched_moved"):
+        assert line(text, metric).endswith("no clear change" if told else "worse")
+    sentence = f"metrics without a limit: {told} too few for a change to be significant among"
+    assert [note.startswith(sentence) for note in report.notes] == [True] * bool(told)
 
 
 def test_a_large_change_that_may_be_chance_is_said_to_be_one() -> None:
