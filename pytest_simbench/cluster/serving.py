@@ -136,6 +136,7 @@ async def _node(
             this = Node.of(nanny.worker_address or "", name, offers)
             print(f"{this}; {slots} at once; it serves {address}", flush=True)
             await nanny.finished()
+            print(f"the head at {address} is gone", flush=True)
 
     while not told.is_set():
         try:
