@@ -16,7 +16,7 @@ from pytest_simbench.ground.versions import base_name
 from pytest_simbench.scene import Robot
 from pytest_simbench.simulator import registry
 from pytest_simbench.simulator.profile_file import ENDING, ProfileFile, read_profile
-from pytest_simbench.simulator.settings import Settings
+from pytest_simbench.simulator.settings import UNDECORATED, Settings
 
 if TYPE_CHECKING:
     from pytest_simbench.experiment.case import Case
@@ -225,10 +225,7 @@ def checked_task(value: Any, where: str) -> Task:
         deaf = "__dataclass_params__" not in vars(kind)
         if not is_dataclass(kind) or (deaf and vars(kind).keys() & {f.name for f in fields(kind)}):
             name = kind.__name__
-            raise BadInput(
-                f"{where}({name}()): what the class sets counts in a dataclass alone: write "
-                f"@dataclass(frozen=True) above class {name}"
-            )
+            raise BadInput(f"{where}({name}()): {UNDECORATED.format(name)}")
         return value
     if isinstance(value, type) and issubclass(value, Task):
         name = value.__name__

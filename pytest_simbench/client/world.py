@@ -358,10 +358,8 @@ class World:
         """An offscreen picture, (height, width, 3); a `BadState` where the engine drew none."""
         drawn: NDArray[np.uint8] = self.process.request("render", width=width, height=height)
         if not is_picture(drawn, (width, height)):
-            came = f"{drawn.dtype} {drawn.shape}"
-            raise BadState(
-                f"render: no picture, uint8 {(height, width, 3)}: {came}", self.process.where
-            )
+            came = f"{drawn.dtype} {drawn.shape}, not uint8 {(height, width, 3)}"
+            raise BadState(f"the engine drew what is no picture: {came}", self.process.where)
         return drawn
 
     def film(

@@ -64,10 +64,8 @@ class TaskVectorEnv(SyncVectorEnv):
         if seed is None or isinstance(seed, int | np.integer):
             seed = [None if seed is None else int(seed) + k for k in range(self.num_envs)]
         if len(seed) != self.num_envs:
-            raise ValueError(
-                f"seed={seed!r:.80}: give one number, or one for each of {self.num_envs} "
-                "environments"
-            )
+            told = f"give one number, or one for each of {self.num_envs} environments"
+            raise ValueError(f"seed={seed!r:.80}: {told}")
         for k in np.flatnonzero((options or {}).get("reset_mask", np.ones(self.num_envs))):
             self.envs[k].begin("reset", seed=seed[k], options=options)
             self._over[k] = False

@@ -36,7 +36,7 @@ from pytest_simbench.records.configuration import differences, other_meanings
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import COSTS, CRASHED, Metric
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import RowKey, by_test, grouped
+from pytest_simbench.records.series import by_test, grouped
 
 
 @dataclass(frozen=True)
@@ -244,27 +244,6 @@ def gate_runs(
     report = run_gate(baseline.records, run.records, limits, metrics, typed=typed)
     other = other_meanings(baseline.tasks, run.tasks)
     return replace(report, differences=(*other, *report.differences))
-
-
-def side_by_side(
-    records: Iterable[Record], name: str, others: Iterable[str]
-) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
-    """One run as two: what a simulator scored, as the baseline of others, and what these scored.
-
-    The records of the simulator of that name are given again as those of each other one: with its
-    name, and the id of its test of the same function, variant, mode and profile. Where the other
-    has no such test they keep the id that they have.
-    """
-    records, others = list(records), list(others)
-    tests = {RowKey.of(record): record.test for record in records}
-    before = [
-        replace(record, simulator=other, test=tests.get(found, record.test))
-        for other in others
-        for record in records
-        if record.simulator == name
-        for found in [RowKey.of(record)._replace(simulator=other)]
-    ]
-    return tuple(before), tuple(record for record in records if record.simulator in others)
 
 
 def _robots(records: Sequence[Record]) -> list[str]:

@@ -11,13 +11,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from pytest_simbench.ground.versions import RELEASE
-from pytest_simbench.measure.gate import run_gate, side_by_side
+from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.measure.history import FACTOR, law_histories
 from pytest_simbench.measure.limits import Limit
 from pytest_simbench.measure.settling import ALIKE, Settled, settlings
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.record import Record, Who
+from pytest_simbench.records.series import side_by_side
 
 DIRECTIONS = {"worse": False, "better": True}
 """In each the later release is gated; *better* with the two releases exchanged."""

@@ -11,12 +11,13 @@ import pytest
 
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.ground.versions import base_name
-from pytest_simbench.measure.gate import gate_runs, side_by_side
+from pytest_simbench.measure.gate import gate_runs
 from pytest_simbench.measure.limits import Limit, LimitError, parse_limits
 from pytest_simbench.plugin import options
 from pytest_simbench.records.baseline import FORMS, BaselineError, from_benchmarks, read_baseline
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric, UnknownMetric
+from pytest_simbench.records.series import side_by_side
 from pytest_simbench.report.markdown.run import render_section
 from pytest_simbench.report.model import changes
 from pytest_simbench.report.model.outcome import Compared

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from typing import NamedTuple, TypeVar
 
@@ -297,3 +298,24 @@ def step_text(seconds: float) -> str:
 def short(test: str) -> str:
     """A test's id without file and class."""
     return test.rpartition("::")[2]
+
+
+def side_by_side(
+    records: Iterable[Record], name: str, others: Iterable[str]
+) -> tuple[tuple[Record, ...], tuple[Record, ...]]:
+    """One run as two: what a simulator scored, as the baseline of others, and what these scored.
+
+    The records of the simulator of that name are given again as those of each other one: with its
+    name, and the id of its test of the same function, variant, mode and profile. Where the other
+    has no such test they keep the id that they have.
+    """
+    records, others = list(records), list(others)
+    tests = {RowKey.of(record): record.test for record in records}
+    before = [
+        replace(record, simulator=other, test=tests.get(found, record.test))
+        for other in others
+        for record in records
+        if record.simulator == name
+        for found in [RowKey.of(record)._replace(simulator=other)]
+    ]
+    return tuple(before), tuple(record for record in records if record.simulator in others)

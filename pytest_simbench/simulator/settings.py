@@ -63,6 +63,11 @@ def profile(profiles: Mapping[str, S], name: str, simulator: str) -> S:
     return profiles[name]
 
 
+UNDECORATED = (
+    "what the class sets counts in a dataclass alone: write @dataclass(frozen=True) above class {}"
+)
+
+
 def flaw(profiles: Mapping[str, Any]) -> str:
     """What is wrong with the profiles of an adapter, in one sentence; empty where nothing is."""
     for name, settings in profiles.items():
@@ -70,8 +75,7 @@ def flaw(profiles: Mapping[str, Any]) -> str:
         if not isinstance(settings, Settings):
             return f"profile {name!r} is no instance of a class of Settings: {settings!r:.60}"
         if "__dataclass_fields__" not in vars(kind):
-            told = f"what {kind.__name__} sets counts in a dataclass alone"
-            return f"{told}: write @dataclass(frozen=True) above it"
+            return UNDECORATED.format(kind.__name__)
     return ""
 
 

@@ -97,7 +97,7 @@ def profiles_complete(subject: Subject) -> None:
     cls = subject.cls
     missing = {"default", "tuned"} - set(cls.profiles)
     require(not missing, f"profiles lack {sorted(missing)}")
-    require(not flaw(cls.profiles), flaw(cls.profiles))
+    require(not (wrong := flaw(cls.profiles)), wrong)
     for name, settings in cls.profiles.items():
         require(settings.timestep > 0, f"profile {name} has timestep {settings.timestep}")
         values = {f.name: getattr(settings, f.name) for f in dataclasses.fields(settings)}

@@ -294,5 +294,5 @@ def test_operations_travel_as_json_to_the_last_bit() -> None:
 def test_what_is_no_picture_is_refused(drawn: np.ndarray) -> None:
     process: Any = ScriptedProcess()
     process.do_render = lambda width, height: drawn
-    with pytest.raises(BadState, match="render: no picture"):
+    with pytest.raises(BadState, match="what is no picture: .*, not uint8"):
         World(process, Scene("empty")).render(4, 3)

@@ -7,12 +7,13 @@ from dataclasses import replace
 import pytest
 
 from pytest_simbench.measure.bisection import between, first_worse, like_the_bad_one, steps
-from pytest_simbench.measure.gate import run_gate, side_by_side
+from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.measure.history import histories
 from pytest_simbench.measure.limits import parse_limits
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.measure.speed import compared
 from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import side_by_side
 from tests.records.build import METRICS, failed, record
 
 PLACED = METRICS[0]

@@ -88,7 +88,7 @@ BROKEN = {
     "good_adapter:NoProfiles": "has no settings in its attribute profiles",
     "!!": "does not import: *",
     "good_adapter:Dicts": "has wrong settings: profile 'default' is no instance of *",
-    "good_adapter:Undecorated": "has wrong settings: what Own sets counts in a dataclass alone: *",
+    "good_adapter:Undecorated": "has wrong settings: what the class sets counts in a *class Own",
     "good_adapter:Good": "says in its info that its name is 'good'",
 }
 

@@ -5,15 +5,27 @@ from __future__ import annotations
 import importlib
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from pytest_simbench.ground.errors import NotSupportedError
+from pytest_simbench.ground.errors import NotSupportedError, SimulatorError
+from pytest_simbench.laws import LAWS
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Pose, Scene, SceneError
-from pytest_simbench.simulator import Seen, Simulator, chosen_on, heavy, lazy_import
+from pytest_simbench.scene.scene import WORDS
+from pytest_simbench.simulator import (
+    Capability,
+    Deviation,
+    Seen,
+    Simulator,
+    chosen_on,
+    heavy,
+    lazy_import,
+)
 from pytest_simbench.simulator.base import EYE, LOOK_AT, view_axes
+from pytest_simbench.testing.faults import mechanisms, true_scene
 from tests.approval import assert_approved_message
 from tests.worker.hosted import Toy
 
@@ -68,3 +80,24 @@ def test_what_adapters_share(monkeypatch: pytest.MonkeyPatch) -> None:
     assert_approved_message(Simulator.untested(Toy()))
     monkeypatch.setattr(Toy, "versions", lambda self: {"toy": "1.2"})
     assert Simulator.untested(Toy()) == ""
+
+
+@pytest.mark.parametrize(
+    ("fact", "told"),
+    [
+        ({"modules": "mujoco"}, r"^info.modules of toy: give a tuple of str, not 'mujoco'$"),
+        ({"deviations": ("soft",)}, r"^info.deviations of toy: give a tuple of Deviation, not \('"),
+        ({"capabilities": "window"}, r"^info.capabilities of toy: give Capability.named\("),
+        ({"friction_rule": "maximal"}, r"^info.friction_rule of toy: 'maximal' .* from maximum, "),
+    ],
+)
+def test_facts_of_another_type_are_refused(fact: dict[str, Any], told: str) -> None:
+    with pytest.raises(SimulatorError, match=told):
+        replace(Toy.info, name="toy", **fact)
+
+
+def test_a_deviation_counts_in_scenes_that_there_are() -> None:
+    with pytest.raises(SimulatorError, match=r"with 'cylindre', which none has; choose from .*box"):
+        Deviation("body/*/mass", "weighs hulls", only="cylindre")
+    made = [law.build() for law in LAWS] + [scene for scene, _ in mechanisms(Capability)]
+    assert {*true_scene().words, *(word for scene in made for word in scene.words)} <= WORDS
