@@ -13,7 +13,9 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from difflib import unified_diff
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +56,9 @@ def assert_approved(name: str, text: str) -> None:
     file = APPROVED / f"{name}.txt"
     if approving():
         file.write_text(found)
-    assert found == file.read_text(), f"{file} holds another text; {HOW}"
+    approved = file.read_text()
+    changed = unified_diff(approved.splitlines(), found.splitlines(), "approved", "found", "", "", 1)
+    assert found == approved, "\n".join([f"{file} holds another text; {HOW}", *islice(changed, 40)])
 
 
 def assert_approved_line(name: str, line: str) -> None:
