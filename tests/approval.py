@@ -57,8 +57,8 @@ def assert_approved(name: str, text: str) -> None:
     if approving():
         file.write_text(found)
     approved = file.read_text()
-    changed = unified_diff(approved.splitlines(), found.splitlines(), "approved", "found", "", "", 1)
-    assert found == approved, "\n".join([f"{file} holds another text; {HOW}", *islice(changed, 40)])
+    changed = islice(unified_diff(approved.splitlines(), found.splitlines(), n=1, lineterm=""), 40)
+    assert found == approved, "\n".join([f"{file} holds another text; {HOW}", *changed])
 
 
 def assert_approved_line(name: str, line: str) -> None:

@@ -22,20 +22,11 @@ from pytest_simbench.testing import CHECKS, Subject
 from tests.approval import assert_approved
 from tests.made_up_world import MadeUp
 
-LEFT_OUT = {
-    "fresh_processes_agree",
-    "imports_without_engine",
-    "parity_of_full_scene",
-    "planted_faults_are_seen",
-    "read_back_is_the_engines",
-    "reading_changes_nothing",
-    "reused_process_agrees",
-    "thrown_cube_flies_free",
-    "time_advances",
-    "unknown_setting_rejected",
-    "window_changes_nothing",
-    "worlds_leave_no_memory",
-}
+LEFT_OUT = """
+    fresh_processes_agree imports_without_engine parity_of_full_scene planted_faults_are_seen
+    read_back_is_the_engines reading_changes_nothing reused_process_agrees thrown_cube_flies_free
+    time_advances unknown_setting_rejected window_changes_nothing worlds_leave_no_memory
+"""
 """They look at processes, files, throws or steps."""
 
 
@@ -123,7 +114,7 @@ class Questioned(Subject):
 
 def test_checks_ask_this() -> None:
     texts = []
-    for name in (name for name in CHECKS if name not in LEFT_OUT):
+    for name in (name for name in CHECKS if name not in LEFT_OUT.split()):
         subject = Questioned(MuJoCo)
         with pytest.MonkeyPatch.context() as patch:
             for module in vars(kit).values():
