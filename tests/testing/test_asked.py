@@ -63,7 +63,10 @@ class Asked(MadeUp):
     def __init__(self, scene: Scene, told: Told) -> None:
         super().__init__(scene)
         self.told = told
-        told.lines.append(f"{scene.name} {data_digest(scene.to_wire(), 6)}")
+        wire = scene.to_wire()
+        for place in ("urdf", "srdf", "packages"):  # of files, on this machine
+            (wire["robot"] or {}).pop(place, None)
+        told.lines.append(f"{scene.name} {data_digest(wire, 6)}")
 
     def wait(self, duration: float, *, log_period: float | None = None) -> Motion:
         self.told.lines.append(f"waits {duration:.6g} s, looks each {log_period}")
