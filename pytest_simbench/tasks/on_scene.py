@@ -33,10 +33,10 @@ class OnScene(Task):
     world: Scene
 
     def parameters(self) -> dict[str, Any]:
-        """The scene by its digest, in which it does not matter where its file is."""
-        wire = self.world.to_wire()
-        if wire.pop("file", "") and (robot := wire["robot"]):  # where they are differs by machine
-            wire["robot"] = {**robot, "urdf": Path(robot["urdf"]).name}
+        """The scene by its digest, in which it does not matter where its files are."""
+        wire = {key: value for key, value in self.world.to_wire().items() if key != "file"}
+        if robot := wire["robot"]:
+            wire["robot"] = {**robot, "urdf": Path(robot["urdf"]).name, "srdf": "", "packages": {}}
         return {
             "task.scene": self.world.name,
             "task.scene_digest": data_digest(wire, 16),

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import permutations
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ import pytest_simbench.testing as kit
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.ground.names import data_digest
 from pytest_simbench.scene import FloatArray, Pose, Scene, Trajectory
+from pytest_simbench.tasks.on_scene import OnScene
 from pytest_simbench.testing import CHECKS, Subject
 from tests.approval import assert_approved
 from tests.made_up_world import MadeUp
@@ -63,10 +65,8 @@ class Asked(MadeUp):
     def __init__(self, scene: Scene, told: Told) -> None:
         super().__init__(scene)
         self.told = told
-        wire = scene.to_wire()
-        for place in ("urdf", "srdf", "packages"):  # of files, on this machine
-            (wire["robot"] or {}).pop(place, None)
-        told.lines.append(f"{scene.name} {data_digest(wire, 6)}")
+        digest = OnScene.parameters(Mock(world=scene))["task.scene_digest"]
+        told.lines.append(f"{scene.name} {digest[:6]}")
 
     def wait(self, duration: float, *, log_period: float | None = None) -> Motion:
         self.told.lines.append(f"waits {duration:.6g} s, looks each {log_period}")
