@@ -168,6 +168,9 @@ def test_a_log_of_a_long_repetition_shows_that_it_lives() -> None:
         desk.progress.count(second // 10, 15, "cubes")
     assert len(desk.written) == int(99 // HEARTBEAT_SECONDS)
     assert desk.written[0] == f"{TEST}  repetition 1 of 1  pick  3/15 cubes\n"
+    desk.now += HEARTBEAT_SECONDS
+    desk.progress.phase("wind up")
+    assert desk.written[-1] == f"{TEST}  repetition 1 of 1  pick  9/15 cubes\n"
 
 
 def test_failures_stay_in_sight() -> None:

@@ -135,6 +135,8 @@ class Progress:
 
     def phase(self, name: str) -> None:
         """The calling thread's repetition is now doing this: launch, load, pick, settle, ..."""
+        if not self._is_tty:
+            self._tell()  # a log that is due says what took so long, not what begins
         self._tell(phase=in_one_line(name))
 
     def count(self, done: int, total: int, noun: str = "") -> None:
@@ -193,10 +195,8 @@ class Progress:
         if self._test is None:
             return None
         active = self._test.active
-        found = active.get(threading.get_ident())
-        if found is None and len(active) == 1:
-            return next(iter(active.values()))
-        return found
+        only = next(iter(active.values())) if len(active) == 1 else None
+        return active.get(threading.get_ident(), only)
 
     def _update(self, force: bool = False) -> None:
         now = self._clock()

@@ -122,6 +122,17 @@ def test_it_opens_fits_and_plays(
     assert page.evaluate("Number(document.getElementById('time').value)") < 1.9  # the end is 2.0
 
 
+def test_what_moves_is_in_sight(tmp_path: Path, opened: Opened) -> None:
+    """In narrow tiles too, and where a body is nearer than the middle of all."""
+    far = longer(1.0)
+    far.bodies[:, 0, :3] = 6.0, 0.0, 0.05
+    kept = [(record(name), Trace.of(scene(), far, [])) for name in ("mujoco", "drake")]
+    page = show(opened, write(tmp_path, kept), 1200, 800)
+    box = "new THREE.Box3().setFromObject(scene.getObjectByName('body 0'))"
+    side = page.evaluate(f"Math.max(...[{box}.min, {box}.max].map((p) => p.project(camera).x))")
+    assert 0.9 < side < 1.0  # 1 is the edge
+
+
 def test_it_ends_by_itself_and_begins_anew(replay: Path, opened: Opened) -> None:
     page = show(opened, replay)
     page.locator("#speed").select_option("20")

@@ -151,7 +151,8 @@
     const ball = box.getBoundingSphere(new THREE.Sphere());
     const tile = state.tiles[0].element.getBoundingClientRect();
     const narrow = Math.min(1, tile.width / tile.height);
-    const away = ball.radius / Math.tan(((camera.fov / 2) * Math.PI) / 180) / narrow;
+    const half = Math.atan(narrow * Math.tan(((camera.fov / 2) * Math.PI) / 180));
+    const away = ball.radius / Math.sin(half); // what is nearer than the centre is in sight too
     const side = new THREE.Vector3(0.35, -1, 0.5).normalize();
     controls.target.copy(ball.center);
     camera.up.set(0, 0, 1);
