@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import closing
@@ -20,7 +21,7 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.scene_file import read_scene_file
 from pytest_simbench.experiment.variants import Variant
 from pytest_simbench.ground.text import for_terminal
-from pytest_simbench.recordings.logs import read_log
+from pytest_simbench.recordings.logs import beyond, read_log
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
@@ -62,13 +63,15 @@ def fit(
     variant = Variant(sim, "headless", labels[0])
     world = read_scene_file(scene).scene
     told = read_log(log, world)
+    for line in beyond(told, world):
+        print(f"{log}: {line}", file=sys.stderr)
     sought = unknowns(list(chain.from_iterable(unknown or ())), world, told)
     parts = (variant.simulator, Path(scene).stem, variant.profile, told.digest, noise, *sought)
     path = Path(output) if output else Path(RUNS) / folder_name(parts, "fit")
     case = chosen.case(variant, test="fit", folder=path, seed=FIRST_CHOSEN)
     if case.base == FILE:
         raise BadInput("the profile file loads the scene as it is written; choose another to fit")
-    with closing(LocalExecutor(1)) as executor, runs_in(path, executor) as runs:
+    with closing(LocalExecutor(1)) as executor, runs_in(path, executor, "fit") as runs:
         ends = time.monotonic() + (budget or BUDGET)
 
         def run(task: Fitting, name: str) -> Record:

@@ -39,8 +39,9 @@ def begins_with(
 
 
 @contextmanager
-def runs_in(path: Path, executor: Executor) -> Iterator[Runs]:
-    """Repetitions whose records lie in a folder, which is locked; what it holds is gone on with.
+def runs_in(path: Path, executor: Executor, command: str) -> Iterator[Runs]:
+    """Repetitions whose records lie in a folder, which is locked; what it holds of the same command
+    is gone on with.
 
     Raises:
         BadInput: it cannot be; or it holds another run.
@@ -52,4 +53,7 @@ def runs_in(path: Path, executor: Executor) -> Iterator[Runs]:
     with closing(folder), refusing(NotResumed, kind=lambda why: BadInput(f"{why}; {advice}")):
         with refusing(RecordError):
             resumed = Resumed(folder) if folder.holds_run else None
+        for record in resumed.records if resumed else ():
+            if not record.function.startswith(command):
+                raise NotResumed(f"{path} holds another run, of {record.test:.80}")
         yield Runs(executor, printed(True), folder, resumed)

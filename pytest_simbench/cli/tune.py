@@ -152,7 +152,7 @@ def _search(
     claims = [f"{metric.name} {claim}" for metric, claim in wanted.claims]
     parts = (name, target, label, wanted.cost, error, seeds, seed, *map(str, space), *claims)
     path = output or Path(RUNS) / folder_name((*parts, *source))
-    with runs_in(path, executor) as runs:
+    with runs_in(path, executor, "tune") as runs:
         looks = Trials(wanted, replace(case, folder=path), runs)
         search = Search(looks, base, space, seed, progress(looks))
         over = ", ".join(dict.fromkeys(one.setting for one in space))

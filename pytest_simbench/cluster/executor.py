@@ -184,6 +184,8 @@ class RemoteRepetition:
     def _able(self, node: Node) -> bool:
         """Whether a node can carry it out, with the version that the run has."""
         name = self.case.simulator
+        if node.stranger:
+            self._tell(f"{node.name} got no repetition: it {node.stranger}")
         if not node.has(name, self.case.mode):
             return False
         version = node.versions[name]

@@ -1,7 +1,7 @@
 """What a node offers, as names of Dask resources, and whether that is what a run needs.
 
     simbench               its slots: repetitions that it carries out at once
-    simbench==0.1.0        version of pytest-simbench
+    simbench==0.1.0+3f...  version of pytest-simbench, and ten digits of its code
     python==3.11           of Python: a task that a test defines travels as code
     mysim==4.0.0           a simulator that is ready there, and the engine's version
     mysim==3.3.7==3.3.7    the same of a release that has an environment of its own there
@@ -12,23 +12,40 @@ Names are all that Dask keeps, so versions stand in them. The amount of each is 
 
 from __future__ import annotations
 
+import hashlib
 import shutil
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from os import environ
+from pathlib import Path
 
 from pytest_simbench import __version__
 from pytest_simbench.client.environments import existing, missing, outside
 from pytest_simbench.ground.versions import RELEASE, VersionedName
+from pytest_simbench.simulator import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo
 from pytest_simbench.simulator.registry import adapter, problem, registered
 
 SLOTS = "simbench"
 DISPLAY = "display"
 PYTHON = f"python=={sys.version_info.major}.{sys.version_info.minor}"
-PLUGIN = f"{SLOTS}=={__version__}"
+
+
+def _code() -> str:
+    """Ten digits of all modules of this package and of the adapters: commits share a version."""
+    found = hashlib.sha256()
+    for package in ("pytest_simbench", "pytest_simbench.sims"):
+        folder = Path(getattr(find_spec(package), "origin", None) or __file__).parent
+        for path in sorted(folder.rglob("*.py")):
+            if package.endswith("sims") or "sims" not in path.relative_to(folder).parts:
+                found.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
+    return found.hexdigest()[:10]
+
+
+PLUGIN = f"{SLOTS}=={__version__}+{_code()}"
 
 
 def here(slots: int, names: Iterable[str] | None = None) -> dict[str, float]:
@@ -42,8 +59,10 @@ def here(slots: int, names: Iterable[str] | None = None) -> dict[str, float]:
     found = [SLOTS, PLUGIN, PYTHON]
     for name in (*registered(), *_releases()) if names is None else names:
         info = adapter(name).info
-        if not missing(info):
+        if not (lacks := missing(info)):
             found.append(f"{name}=={_version(info)}")
+        elif names is not None:
+            raise SimulatorError(f"{name} cannot be offered: {lacks}")
     if environ.get("DISPLAY") or environ.get("WAYLAND_DISPLAY") or shutil.which("Xvfb"):
         found.append(DISPLAY)
     return dict.fromkeys(found, float(slots))
@@ -118,7 +137,7 @@ def refusal(nodes: Sequence[Node]) -> str:
         return "it has no node; start one: simbench cluster node ADDRESS"
     strangers = [f"{node.name} {node.stranger}" for node in nodes if node.stranger]
     if strangers:
-        return f"{'; '.join(strangers)}; install the same version on both sides"
+        return f"{'; '.join(strangers)}; install the same version and commit on both sides"
     return ""
 
 

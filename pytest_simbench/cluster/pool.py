@@ -21,6 +21,7 @@ from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.cluster import node as node_side
 from pytest_simbench.cluster.job import Packed
 from pytest_simbench.cluster.offers import Node
+from pytest_simbench.worker.wire import named
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -40,18 +41,45 @@ Dask itself takes five minutes, and half a minute more to try whether the node c
 SETTINGS = "simbench"
 """Key of the scheduler's metadata under which the head says so."""
 
+TLS = "one that was started with --tls is at tls://, another one at tcp://"
+
 PATIENCE = 60.0
 """How long a job waits for a node that offers what it needs, when there is none left [s]."""
 
 
-def check_certificates(role: str) -> None:
-    """Complain where Dask's configuration has no certificate for a client, worker or scheduler."""
+def check_security(role: str, *, tls: bool) -> None:
+    """Complain where Dask's configuration has no certificate for a client, worker or scheduler, one
+    that cannot be read, or asks for encryption and there is none."""
     from distributed import Security
 
-    if Security().get_connection_args(role).get("ssl_context") is None:
+    security = Security()
+    if not tls and security.require_encryption:
+        raise ExecutorError(
+            "Dask's configuration here asks for encryption; start the head with --tls, and "
+            "write tls://"
+        )
+    try:
+        context = security.get_connection_args(role).get("ssl_context") if tls else ""
+    except (OSError, ValueError, TypeError) as error:  # of ssl, too
+        files = (
+            security.tls_ca_file,
+            *(getattr(security, f"tls_{role}_{k}") for k in ("cert", "key")),
+        )
+        raise ExecutorError(
+            f"the certificates for the {role} in Dask's configuration cannot be read "
+            f"({', '.join(map(str, files))}): {named(error)}"
+        ) from None
+    if context is None:
         raise ExecutorError(
             f"tls:// needs certificates for the {role} in Dask's configuration (docs/cluster.md)"
         )
+
+
+def reason(error: BaseException) -> str:
+    """What began it: Dask's own errors say that something failed, and not why."""
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return named(error) if not str(error) else " ".join(str(error).split())[:300]
 
 
 class Pool:
@@ -66,16 +94,10 @@ class Pool:
 
     def __init__(self, address: str) -> None:
         try:
-            from distributed import Client, Security
+            from distributed import Client
         except ImportError:
             raise ExecutorError(INSTALL) from None
-        if address.lower().startswith("tls"):
-            check_certificates("client")
-        elif Security().require_encryption:
-            raise ExecutorError(
-                "Dask's configuration here asks for encryption; start the head with --tls, and "
-                "write tls://"
-            )
+        check_security("client", tls=address.lower().startswith("tls"))
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # said here, and shorter
         self.address = address
         try:
@@ -84,10 +106,9 @@ class Pool:
             )
             settings = self._client.get_metadata([SETTINGS], default={})
         except (OSError, RuntimeError, ValueError, TypeError) as error:
-            reason = " ".join(str(error).split())[:300]
             raise ExecutorError(
-                f"no scheduler of Dask answers at {address} ({reason}); start one: "
-                "simbench cluster head"
+                f"no scheduler of Dask answers at {address} ({reason(error)}); start one: "
+                f"simbench cluster head; {TLS}"
             ) from None
         self._begin()
         self.lost_after = float(settings.get("lost-after", LOST_AFTER))
@@ -218,9 +239,14 @@ class Pool:
 
     def result(self, future: Future) -> Coming[Mapping[str, Any]]:
         """What a job will give. It may never come: what a node has found is lost with it, and Dask
-        waits for another node to find it again, which it may not."""
-        result = self._client.gather(future, asynchronous=True)
-        return asyncio.run_coroutine_threadsafe(result, self._client.loop.asyncio_loop)
+        waits for another node to find it again, which it may not. (`Client.gather` leaves tasks
+        that end in an error which nobody takes: Python tells of it in the middle of anything.)"""
+
+        async def result() -> Mapping[str, Any]:
+            found: Mapping[str, Any] = await future
+            return found
+
+        return asyncio.run_coroutine_threadsafe(result(), self._client.loop.asyncio_loop)
 
     @property
     def joined(self) -> bool:

@@ -17,7 +17,7 @@ from typing import Any
 
 from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.cluster.offers import Node, here
-from pytest_simbench.cluster.pool import INSTALL, LOST_AFTER, SETTINGS, check_certificates
+from pytest_simbench.cluster.pool import INSTALL, LOST_AFTER, SETTINGS, TLS, check_security, reason
 from pytest_simbench.simulator.registry import check_names
 
 LOOPBACK = "127.0.0.1"
@@ -67,23 +67,15 @@ def _run(serve: Callable[[], Coroutine[Any, Any, None]], otherwise: str, advice:
     try:
         asyncio.run(serve())
     except (OSError, ValueError, RuntimeError) as error:
-        raise ExecutorError(f"{otherwise} ({_reason(error)}); {advice}") from None
+        raise ExecutorError(f"{otherwise} ({reason(error)}); {advice}") from None
     return 0
-
-
-def _reason(error: BaseException) -> str:
-    """What began it: Dask's own errors say that something failed, and not why."""
-    while error.__cause__ is not None:
-        error = error.__cause__
-    return " ".join(str(error).split())
 
 
 async def _head(host: str, port: int, lost_after: float, tls: bool, pages: bool) -> None:
     import dask
     from distributed import Scheduler
 
-    if tls:
-        check_certificates("scheduler")
+    check_security("scheduler", tls=tls)
     if not pages:
         dask.config.set({"distributed.scheduler.http.routes": []})
     dask.config.set(
@@ -116,8 +108,7 @@ async def _node(
     from distributed.utils import get_ip
 
     dask.config.set({"distributed.worker.http.routes": []})  # its process inherits that
-    if address.startswith("tls"):
-        check_certificates("worker")
+    check_security("worker", tls=address.startswith("tls"))
     offers = here(slots, names)
     head = get_address_host(resolve_address(address))
     logging.getLogger("distributed.nanny").setLevel(logging.CRITICAL)  # what it logs is told below
@@ -151,11 +142,11 @@ async def _node(
 
 def not_taken(address: str, name: str, error: BaseException) -> str:
     """That no head takes the node; why one refuses it stands in the log of Dask alone."""
-    reason = _reason(error)
-    told = f"no head at {address} takes this node ({reason})"
-    if "name taken" in reason or reason.startswith("Worker failed to start"):
-        told += f"; if Dask says above that the name {name!r} is taken, give another --name"
-    return told
+    why = reason(error)
+    told = f"no head at {address} takes this node ({why})"
+    if "name taken" in why or why.startswith("Worker failed to start"):
+        return f"{told}; if Dask says above that the name {name!r} is taken, give another --name"
+    return f"{told}; {TLS}"
 
 
 def _told() -> asyncio.Event:

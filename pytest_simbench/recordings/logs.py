@@ -41,6 +41,9 @@ SHORTEST, LONGEST = 0.1, 600.0
 FINEST = 1e-3
 """Steps of a log are kept down to this [s]."""
 
+FARTHEST = 1e9
+"""Any number of a log."""
+
 MOST = 1_000_000
 """Messages of a recording."""
 
@@ -150,6 +153,8 @@ def _numbers(name: str, array: np.ndarray) -> FloatArray:
     finite = np.isfinite(array).all(axis=tuple(range(1, array.ndim)))
     if not finite.all():
         raise ValueError(f"has no finite number of {name!r:.80} in row {int(np.argmin(finite))}")
+    if np.abs(array).max(initial=0.0) > FARTHEST:
+        raise ValueError(f"has a number of {name!r:.80} beyond {FARTHEST:g}, and is in SI units")
     return np.asarray(array, dtype=float)
 
 

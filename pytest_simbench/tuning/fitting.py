@@ -111,13 +111,15 @@ class Fit:
             TuningError: nothing runs.
         """
         found: list[State] = []
-        for state in self._coarse()[:RESTARTS]:
+        coarse = self._coarse()
+        for state in coarse[:RESTARTS]:
             found.append(self._least(state))
             if not self.misfit(found[-1].columns):
                 break
         best = min(found, key=lambda state: self._cost(state.columns))
-        if self.misfit(best.columns):
-            best = self._least(self._pattern(best))
+        told = best.slopes[:, : len(self.unknowns)].any(axis=0).all()
+        if self.misfit(best.columns) or not (told or self.noise):
+            best = self._least(self._pattern(best if told else coarse[0]))
         sizes = np.linalg.norm(best.slopes, axis=0)
         if np.linalg.cond(best.slopes / np.maximum(sizes, 1e-9)) > 10:
             best = replace(best, slopes=self._slopes(best, both=True))  # what goes together
@@ -205,7 +207,7 @@ class Fit:
         """Steps of one unknown at a time, half as long where none is better, until what is left is
         the noise."""
         step = PATTERN
-        while step > STEP and self.misfit(at.columns):
+        while step > STEP and (self.misfit(at.columns) or not self.noise):
             best = at
             for k, h in product(range(len(self.unknowns)), (step, -step)):
                 point = at.point.copy()

@@ -11,7 +11,7 @@ import numpy as np
 
 from pytest_simbench.description.robot_files import content_of, description_xml, keep
 from pytest_simbench.description.urdf import INERTIA, PreparedRobot
-from pytest_simbench.scene import Robot, Scene, Start
+from pytest_simbench.scene import Robot, Scene, SceneError, Start
 from pytest_simbench.scene.pose import vector3
 from pytest_simbench.scene.robot import FREE
 from pytest_simbench.tasks import Log
@@ -98,6 +98,11 @@ def unknowns(texts: Sequence[str], scene: Scene, log: Log) -> list[Unknown]:
         else:
             raise TuningError(f"{name} is {value:g} in the scene: give a range, {name}=LOW..HIGH")
         _check_told(name, scene, log)
+        try:
+            for end in (low, high):
+                changed(scene, {name: end})
+        except SceneError as error:
+            raise TuningError(f"{text[:80]!r}: {error}") from None
         found[name] = Unknown(name, value, low, high)
     return list(found.values())
 

@@ -98,6 +98,7 @@ def test_the_mass_and_both_gains_are_not_told_apart(
         ({"log.npz": "other.npz"}, "holds 'knee', which scene 'drive' has not"),
         ({"0.001": "0"}, "give a number from 1e-09 to 1"),
         ({"drive.xml": "none.xml"}, "none.xml"),
+        ({"damping:hinge": "damping:hinge=1..1e15"}, "'damping:hinge=1..1e15': the damping of"),
         ({"--noise": "--profile", "0.001": "file"}, "loads the scene as it is written"),
     ],
 )
@@ -116,6 +117,20 @@ def test_no_unknown_and_no_time(folder: Path, capsys: pytest.CaptureFixture[str]
     assert "name what is unknown: --unknown NAME; choose from" in capsys.readouterr().err
     assert main([*BOTH, "--budget", "0.5s"]) == 130
     assert "the budget is used up after" in capsys.readouterr().out
+    with np.load(folder / "log.npz") as log:  # in mm
+        np.savez(folder / "far.npz", **{**log, "hinge": 1000 * log["hinge"]})
+    far = ["fit", "drive.xml", "far.npz", *BOTH[3:7], "--budget", "0.1s", "--output"]
+    assert main([*far, "far", *BOTH[-2:]]) == 130
+    assert "far.npz: hinge goes from" in capsys.readouterr().err
     (folder / "drive.xml").write_text(DRIVE.format(25, 13))
     assert main(BOTH) == 2
     assert "begin anew in another folder: --output DIR" in capsys.readouterr().err
+    (folder / "run").mkdir()
+    whole = (
+        (folder / "out/records.jsonl").read_text().replace('"function": "fit"', '"function": "f"')
+    )
+    (folder / "run/records.jsonl").write_text(whole)
+    assert main([*far, "run", *BOTH[-2:]]) == 2
+    assert (
+        "run holds another run, of fit[mujoco-headless-e0]; begin anew" in capsys.readouterr().err
+    )

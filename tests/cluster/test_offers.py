@@ -10,6 +10,7 @@ import pytest
 
 from pytest_simbench.cluster import offers
 from pytest_simbench.cluster.offers import PLUGIN, PYTHON
+from pytest_simbench.simulator import SimulatorError
 
 OUTSIDE = {
     "pybullet": SimpleNamespace(version=lambda: "2.5"),
@@ -46,10 +47,28 @@ def test_simulators_are_offered_by_name_and_version(
 ) -> None:
     for name in ("mujoco==3.3.7", "drake==1.0", "mujoco", "nothing==1.0"):
         (tmp_path / name).mkdir()
-    assert offered("drake", "pybullet", "sapien") == {"pybullet==2.5", "sapien==unknown"}
+    assert offered("pybullet", "sapien") == {"pybullet==2.5", "sapien==unknown"}
+    with pytest.raises(SimulatorError, match="drake cannot be offered: not here"):
+        offered("drake")
     assert offers.here(3, []) == {"simbench": 3.0, PLUGIN: 3.0, PYTHON: 3.0}
     found = {name for name in offers.here(1) if name.startswith(("drake", "mujoco", "nothing"))}
     assert found == {"mujoco==3.9", "mujoco==3.3.7==3.9"}
+
+
+def test_another_commit_is_another_version(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Wherever it lies; also where an adapter alone is another."""
+    found = set()
+    for place, text in (("a", "1"), ("b", "1"), ("c", "2")):
+        for name, code in (("pytest_simbench/x.py", "0"), ("pytest_simbench.sims/x.py", text)):
+            path = tmp_path / place / name
+            path.parent.mkdir(parents=True)
+            path.write_text(code)
+        origin = str(tmp_path / place / "{}" / "__init__.py")
+        monkeypatch.setattr(
+            offers, "find_spec", lambda name, at=origin: SimpleNamespace(origin=at.format(name))
+        )
+        found.add(offers._code())
+    assert len(found) == 2
 
 
 def test_a_display_is_a_screen_or_what_makes_one(bare: pytest.MonkeyPatch, tmp_path: Path) -> None:

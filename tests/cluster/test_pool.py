@@ -17,7 +17,7 @@ from pytest_simbench.cluster import pool as module
 from pytest_simbench.cluster import serving
 from pytest_simbench.cluster.executor import ClusterExecutor
 from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node, here, refusal, unmet
-from pytest_simbench.cluster.pool import Pool
+from pytest_simbench.cluster.pool import TLS, Pool, reason
 from pytest_simbench.cluster.serving import not_taken
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
@@ -103,12 +103,17 @@ def test_what_nobody_has_or_in_several_versions_is_named_with_what_each_has() ->
     ("stranger", "words"),
     [
         (node("old", "simbench==0.0", PYTHON), f"pytest-simbench 0.0, and this is {PLUGIN[10:]}"),
+        (node("old", f"{PLUGIN[:-10]}0123456789", PYTHON), "pytest-simbench 0.1.0+0123456789, and"
+         f" this is {PLUGIN[10:]}"),
         (node("old", PLUGIN, "python==2.7"), f"Python 2.7, and this is {PYTHON[8:]}"),
     ],
 )  # fmt: skip
 def test_other_versions_are_refused(stranger: Node, words: str) -> None:
     told = refusal([stranger, lab("lab1"), replace(stranger, name="b")])
-    assert told == f"old runs {words}; b runs {words}; install the same version on both sides"
+    assert (
+        told
+        == f"old runs {words}; b runs {words}; install the same version and commit on both sides"
+    )
     assert not stranger.has("mujoco", "headless")
     assert not refusal([lab("lab1")])
     assert refusal([]) == "it has no node; start one: simbench cluster node ADDRESS"
@@ -179,6 +184,10 @@ def test_a_node_that_joins_with_another_version_is_left_out_and_told(case: Case)
     repetition = executor.repetition(Experiment(case, Falling()), 1)
     assert [repetition._able(node) for node in (A, lab("c", "mujoco==9.9"))] == [True, False]
     assert told == ["c got no repetition: mujoco is 9.9 there, 4.0 here"]
+    assert not repetition._able(node("late", "simbench==0.2", PYTHON, "mujoco==4.0"))
+    assert told[1].startswith(
+        "late got no repetition: it runs pytest-simbench 0.2, and this is 0.1"
+    )
 
 
 def test_waiting_ends_when_the_run_does() -> None:
@@ -205,6 +214,24 @@ def test_what_cannot_begin_says_so(
     assert told.format(port) in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("head", "configuration here asks for encryption; start the head with --tls, and write"),
+        ("node tls://h:1", "cannot be read (/none/ca, /none/worker, None): FileNotFoundError"),
+    ],
+)
+def test_security_that_cannot_be_says_so(
+    words: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dask = pytest.importorskip("dask")
+    comm = "distributed.comm."
+    files = {f"{comm}tls.ca-file": "/none/ca", f"{comm}tls.worker.cert": "/none/worker"}
+    with dask.config.set({f"{comm}require-encryption": True, **files}):
+        assert main(["cluster", *words.split()]) == 2
+    assert told in capsys.readouterr().err
+
+
 def test_a_node_that_looks_for_its_head_ends_when_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Dask looks for half a minute."""
 
@@ -220,12 +247,13 @@ def test_a_node_that_looks_for_its_head_ends_when_told(monkeypatch: pytest.Monke
 
 
 def test_a_node_whose_name_is_taken_is_told_to_take_another() -> None:
-    for reason in ("Worker failed to start.", "Unexpected response: {'message': 'name taken, vm'}"):
+    for why in ("Worker failed to start.", "Unexpected response: {'message': 'name taken, vm'}"):
         error = RuntimeError("Nanny failed to start.")
-        error.__cause__ = RuntimeError(reason)
+        error.__cause__ = RuntimeError(why)
         assert not_taken("tcp://head:8786", "vm", error) == (
-            f"no head at tcp://head:8786 takes this node ({reason}); if Dask says above that the "
+            f"no head at tcp://head:8786 takes this node ({why}); if Dask says above that the "
             "name 'vm' is taken, give another --name"
         )
     away = not_taken("tcp://head:8786", "vm", OSError("Timed out"))
-    assert away == "no head at tcp://head:8786 takes this node (Timed out)"
+    assert away == f"no head at tcp://head:8786 takes this node (Timed out); {TLS}"
+    assert reason(OSError()) == "OSError"  # Dask's may say nothing

@@ -160,6 +160,7 @@ def test_a_recording_of_ours_is_read_back(
         ({"time": TIME, "knee": TIME}, "holds 'knee'.* it has hinge, slider, table/pose"),
         ({"time": TIME, "table/pose": np.zeros((21, 7)), "hinge": TIME}, "no unit length"),
         ({"time": TIME, "hinge": TIME * np.nan}, "no finite number of 'hinge' in row 0"),
+        ({"time": TIME, "hinge": TIME * 1e10}, "a number of 'hinge' beyond 1e.09, and is in SI"),
         ({"time": TIME[::-1], "hinge": TIME}, "goes from 1 s to 0.95 s in row 1"),
         ({"time": np.minimum(TIME, 0.5), "hinge": TIME}, "goes from 0.5 s to 0.5 s in row 11"),
         ({"time": TIME, "hinge": TIME[1:]}, r"'hinge' in the shape \(20,\) instead of \(21,\)"),

@@ -73,6 +73,18 @@ def fit(
     return {t.unknown.name: t for t in told(one, one.best())}, one
 
 
+def test_a_plateau_is_left() -> None:
+    """Where it begins nothing slides, and at the other points much too far."""
+
+    def slides(of: Mapping[str, float], start: float) -> FloatArray:
+        return start + max(0.0, 1.7 - of["passive_damping:slider"]) * TIME**2
+
+    name = "passive_damping:slider"
+    told, _ = fit([name], motion=slides, noise=None, scene_truth=TRUTH | {name: 4.0})
+    assert not told[name].why
+    assert told[name].value == pytest.approx(TRUTH[name], rel=0.01)
+
+
 @pytest.mark.parametrize(("noise", "fits", "least"), [(NOISE, 100, 88), (None, 40, 34)])
 def test_planted_values_are_found_and_intervals_cover(
     noise: float | None, fits: int, least: int
