@@ -81,6 +81,7 @@ def fit(
             own = replace(case, test=test, function="fit", variant=name)
             return runs.records(Experiment(own, task), [1])[1]
 
+        (path / RESULT).unlink(missing_ok=True)  # until it is told anew
         fitting = Fit(world, told, sought, noise, run)
         try:
             found = fitting.best()

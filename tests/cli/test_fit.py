@@ -77,6 +77,7 @@ def test_gains_of_a_drive_from_the_closed_form(
     assert capsys.readouterr().out.count(told.partition("values:")[0]) == 2
     monkeypatch.setattr(Fit, "widened", Mock(side_effect=_OutOfTime))  # while intervals are tried
     assert main(BOTH) == 130
+    assert not (folder / "out/fitted.json").exists()
     assert "the same command with a larger --budget goes on" in capsys.readouterr().out
 
 
