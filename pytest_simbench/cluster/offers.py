@@ -32,6 +32,7 @@ from pytest_simbench.simulator.registry import adapter, problem, registered
 SLOTS = "simbench"
 DISPLAY = "display"
 PYTHON = f"python=={sys.version_info.major}.{sys.version_info.minor}"
+BESIDE = {"sims", "suites"}  # in a checkout; in the package where that is installed
 
 
 def _code() -> str:
@@ -40,8 +41,9 @@ def _code() -> str:
     for package in ("pytest_simbench", "pytest_simbench.sims"):
         folder = Path(getattr(find_spec(package), "origin", None) or __file__).parent
         for path in sorted(folder.rglob("*.py")):
-            if package.endswith("sims") or "sims" not in path.relative_to(folder).parts:
-                found.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
+            within = path.relative_to(folder)
+            if BESIDE.isdisjoint(within.parts):
+                found.update(within.as_posix().encode() + path.read_bytes())
     return found.hexdigest()[:10]
 
 

@@ -59,7 +59,8 @@ def test_another_commit_is_another_version(monkeypatch: pytest.MonkeyPatch, tmp_
     """Wherever it lies; also where an adapter alone is another."""
     found = set()
     for place, text in (("a", "1"), ("b", "1"), ("c", "2")):
-        for name, code in (("pytest_simbench/x.py", "0"), ("pytest_simbench.sims/x.py", text)):
+        files = {"pytest_simbench/x.py": "0", "pytest_simbench.sims/x.py": text}
+        for name, code in (files | {"pytest_simbench/suites/x.py": place}).items():
             path = tmp_path / place / name
             path.parent.mkdir(parents=True)
             path.write_text(code)
