@@ -64,7 +64,7 @@ def fit(
     world = read_scene_file(scene).scene
     told = read_log(log, world)
     for line in beyond(told, world):
-        print(f"{log}: {line}", file=sys.stderr)
+        print(for_terminal(f"{log}: {line}"), file=sys.stderr)
     sought = unknowns(list(chain.from_iterable(unknown or ())), world, told)
     parts = (variant.simulator, Path(scene).stem, variant.profile, told.digest, noise, *sought)
     path = Path(output) if output else Path(RUNS) / folder_name(parts, "fit")

@@ -12,7 +12,6 @@ Names are all that Dask keeps, so versions stand in them. The amount of each is 
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,6 +23,7 @@ from pathlib import Path
 
 from pytest_simbench import __version__
 from pytest_simbench.client.environments import existing, missing, outside
+from pytest_simbench.data.download import digest
 from pytest_simbench.ground.versions import RELEASE, VersionedName
 from pytest_simbench.simulator import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo
@@ -37,14 +37,14 @@ BESIDE = {"sims", "suites"}  # in a checkout; in the package where that is insta
 
 def _code() -> str:
     """Ten digits of all modules of this package and of the adapters: commits share a version."""
-    found = hashlib.sha256()
+    files = {}
     for package in ("pytest_simbench", "pytest_simbench.sims"):
         folder = Path(getattr(find_spec(package), "origin", None) or __file__).parent
-        for path in sorted(folder.rglob("*.py")):
+        for path in folder.rglob("*.py"):
             within = path.relative_to(folder)
             if BESIDE.isdisjoint(within.parts):
-                found.update(within.as_posix().encode() + path.read_bytes())
-    return found.hexdigest()[:10]
+                files[f"{package}/{within.as_posix()}"] = path.read_bytes()
+    return digest(files)[:10]
 
 
 PLUGIN = f"{SLOTS}=={__version__}+{_code()}"
