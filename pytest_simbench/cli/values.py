@@ -189,10 +189,10 @@ def choice(*words: str) -> Callable[[str], str]:
     return choose
 
 
-def word(text: str) -> str:
-    """A name."""
+def word(text: str, form: str = "a name") -> str:
+    """A name; `form` is for messages."""
     if not text.strip():
-        raise BadValue(text, "give a name")
+        raise BadValue(text, f"give {form}")
     if len(text.strip()) > LONGEST_WORD or not text.isprintable():
         raise BadValue(text, f"a name has at most {LONGEST_WORD} printable characters")
     return text.strip()
@@ -209,7 +209,7 @@ def simulator(text: str) -> str:
     name, at, path = text.strip().partition("@")
     if not text.isprintable():
         raise BadValue(text, "give printable characters")
-    return word(name) + at + (file(path) if at else "")
+    return word(name, "a name (simbench list)") + at + (file(path) if at else "")
 
 
 def simulators(text: str) -> list[str]:

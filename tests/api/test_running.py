@@ -177,7 +177,7 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "class": ({"task": Falling}, "a class instead of a task: write run(Falling())"),
     "task": ({"task": 3}, "run(3) takes a task, for instance run(Throwing())"),
     "misspelt": ({"simulators": "mojuco"}, "unknown simulator 'mojuco'; choose from "),
-    "none": ({"simulators": []}, "give a name"),
+    "none": ({"simulators": []}, "give a name (simbench list)"),
     "names": ({"simulators": None}, "simulators=None: give names of simulators, or leave it out"),
     "number": ({"simulators": 5}, "simulators=5: give names of simulators"),
     "list": ({"settings": [1]}, "settings=[1]: give those of each simulator by its name, for "),
