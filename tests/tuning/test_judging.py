@@ -72,6 +72,7 @@ def test_margins() -> None:
         ([0.0] * SEEDS, [1.0] * 30 + [0.0] * (SEEDS - 30), "worse"),
         ([1.0] * 30 + [0.0] * (SEEDS - 30), [0.0] * SEEDS, "better"),
         ([0.0] * SEEDS, [1.0] * 3 + [0.0] * (SEEDS - 3), "not shown"),
+        ([0.3, 0.0, 0.0], [0.0, 0.1, 0.2], "not shown"),  # as wrong on the whole: by 0, no 2e-17
     ],
 )
 def test_verdicts_on_seeds(before: list[float], after: list[float], verdict: str) -> None:
