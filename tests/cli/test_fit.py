@@ -156,7 +156,7 @@ def test_all_that_is_said_of_a_fit() -> None:
     first: dict[str, Any] = {"off": 12.3456}
     fitting: Any = SimpleNamespace(
         scene=SCENE, log=log, looks=17, first=SimpleNamespace(metrics=first),
-        misfit=lambda of: {name: 4.5678 for name in of},
+        misfit=lambda of: dict.fromkeys(of, 4.5678),
     )  # fmt: skip
     found: Any = SimpleNamespace(
         columns=columns, record=SimpleNamespace(metrics={"off": 0.98765, "turned": None})

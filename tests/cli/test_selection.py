@@ -12,7 +12,6 @@ from pytest_simbench.cli.selection import Selection, check, profiles_of, robots_
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node
 from pytest_simbench.experiment.variants import Variant
-from pytest_simbench.ground.errors import SettingsError
 from tests.motion.small_arm import small_arm
 
 SETTINGS = """simulator = "mujoco"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from pytest_simbench.description.urdf import pose_of_rpy
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.motion.adapting import bound_joints
 from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.model import RobotModel
@@ -105,6 +107,21 @@ def test_a_joint_without_end_gets_limits(
     model = RobotModel(read_robot(small_arm(tmp_path, urdf=urdf)))
     assert model.lower[0] == pytest.approx(lower)
     assert model.upper[0] == pytest.approx(upper)
+
+
+def test_limits_are_made_where_there_are_none_and_both_ends_stay_where_there_is_one() -> None:
+    urdf = ET.fromstring(
+        '<robot><joint name="a" type="continuous"/><joint name="b" type="fixed"/>'
+        '<joint name="c" type="continuous"><limit lower="1"/></joint></robot>'
+    )
+    assert bound_joints(urdf)
+    turn = repr(2 * np.pi)
+    assert ET.tostring(urdf, encoding="unicode") == (
+        f'<robot><joint name="a" type="revolute"><limit lower="-{turn}" upper="{turn}" /></joint>'
+        '<joint name="b" type="fixed" /><joint name="c" type="revolute"><limit lower="1" /></joint>'
+        "</robot>"
+    )
+    assert not bound_joints(urdf)
 
 
 def test_the_tool_centre_point_may_lie_beside_a_link(tmp_path: Path) -> None:

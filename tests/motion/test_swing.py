@@ -103,6 +103,27 @@ def test_candidates_throw_there_within_their_limits() -> None:
         assert np.flatnonzero(velocity).tolist() == moving
 
 
+@pytest.mark.parametrize("name", ["panda", "ur5", "xarm7"])
+def test_the_hand_s_plane_goes_through_the_target_and_the_fingers_open_across_it(name: str) -> None:
+    """Also where the hand begins turned, to either side."""
+    for turned in (-0.3, 0.0, 0.4):
+        robot = find(name)
+        joints = list(robot.joints)
+        last = len(robot.arm_joints) - 1
+        joints[last] = replace(
+            joints[last], initial_position=joints[last].initial_position + turned
+        )
+        model = RobotModel(replace(robot, joints=tuple(joints)))
+        ready, moving = _in_plane(model, 1.2)
+        for bent in (0.0, 0.1):
+            ready[moving] += bent
+            tool = model.tool_transform(ready)
+            across = tool.rotation[:, 1]
+            assert across[2] == pytest.approx(0.0, abs=1e-5)
+            away = np.array([1.2, 0.0, 0.0]) - tool.translation
+            assert away @ across == pytest.approx(0.0, abs=1e-5)
+
+
 def test_joints_share_a_velocity_by_their_limits() -> None:
     """The second one alone makes the second part; shares 1 and 1 of the others make the first."""
     ways, limits = np.array([[1.0, 0.0, 2.0], [0.0, -1.0, 0.0]]), np.array([1.0, 4.0, 3.0])
