@@ -152,14 +152,10 @@ def test_all_that_is_said_of_a_fit() -> None:
                for name, was, now, why in values]  # fmt: skip
     log = Log(Trajectory(1.0, *(np.zeros((2, 2)),) * 3), ["hinge", "slider"], Start((), ()),
               Start((), ()), "", {})  # fmt: skip
-    columns = {"slider": np.zeros((3, 1))}
-    first: dict[str, Any] = {"off": 12.3456}
+    first, last = (SimpleNamespace(metrics={"off": off, "turned": None}) for off in (12.345, 0.98))
+    found: Any = SimpleNamespace(columns=["slider"], record=last)
     fitting: Any = SimpleNamespace(
-        scene=SCENE, log=log, looks=17, first=SimpleNamespace(metrics=first),
-        misfit=lambda of: dict.fromkeys(of, 4.5678),
-    )  # fmt: skip
-    found: Any = SimpleNamespace(
-        columns=columns, record=SimpleNamespace(metrics={"off": 0.98765, "turned": None})
+        scene=SCENE, log=log, looks=17, first=first, misfit=lambda of: dict.fromkeys(of, 4.5678)
     )
     assert_approved("fit", "\n".join(_lines(results, fitting, found)))
     assert json.loads(_written(results)) == {

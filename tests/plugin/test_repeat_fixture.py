@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,39 +15,32 @@ from pytest_simbench.plugin.repeat_fixture import claim_of
 from pytest_simbench.records.claims import Claim
 from tests.records.build import METRICS, failed, records
 
-TEST = {"simulator": "engine", "mode": "gui", "profile": "real", "function": "t.py::test_it",
-        "variant": "a-b"}  # fmt: skip
+TEST: dict[str, Any] = {"simulator": "engine", "mode": "gui", "profile": "real",
+                        "function": "t.py::test_it", "variant": "a-b"}  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("threshold", "verdict", "advice"),
-    [(0.6, "FAIL", ""), (0.1, "PASS", ""), (0.5, "UNDECIDED", "more repetitions needed")],
+    [(0.6, "FAIL", ""), (0.1, "PASS", ""), (0.5, "UNDECIDED", "about 295 more repetitions needed")],
 )
-def test_all_that_is_kept_of_a_claim(threshold: float, verdict: str, advice: str) -> None:
+def test_all_that_is_kept_of_a_claim(threshold: float, verdict: Any, advice: str) -> None:
     """Of 20 repetitions whose mean is 0.5, of one that has no value and one that crashed."""
-    rows = records("placed", [0.45, 0.55] * 10)
-    rows += [*records("hit", [1.0], settings={"task.n": 3}), failed(30)]
+    rows = [*records("placed", [0.45, 0.55] * 10), *records("hit", [1.0]), failed(30)]
     result = ResultSet(rows, METRICS)
     result.strict = result.warns = False
-    try:
+    with suppress(AssertionError):
         result.assert_at_least("placed", threshold)
-    except AssertionError:
-        assert verdict == "FAIL"
     ((metric, judgement),) = result.judged
     case: Any = SimpleNamespace(**TEST, test="t.py::test_it[engine-gui-a-b]")
-    found = claim_of(case, result, metric, judgement)
     bounds = judgement.interval
-    assert found == Claim(
+    assert claim_of(case, result, metric, judgement) == Claim(
         **TEST, test=case.test, task="stacking", metric="placed", relation="at least",
         threshold=threshold, verdict=verdict, mean=bounds.mean, low=bounds.low, high=bounds.high,
-        n=bounds.n, crashed=1, without=1, advice=judgement.advice, parameters=found.parameters,
+        n=21, crashed=1, without=1, advice=advice, parameters="{}",
     )  # fmt: skip
-    assert bounds.low < 0.5 < bounds.high
-    assert advice in found.advice
 
 
 def test_all_that_is_kept_of_a_test_that_failed() -> None:
-    """With what stood in its id besides, and the first line of the error, as pytest tells it."""
     variant = Variant("engine", "gui", "real")
     chosen = SimpleNamespace(params={"sim_case": variant}, id="a-engine-gui-real-b",
                              _idlist=["a", "engine-gui-real", "b"])  # fmt: skip
