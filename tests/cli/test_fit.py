@@ -13,8 +13,7 @@ import pytest
 
 from pytest_simbench.cli.fit import _lines, _OutOfTime, _written
 from pytest_simbench.cli.main import main
-from pytest_simbench.scene import Start, Trajectory
-from pytest_simbench.tasks import Log
+from pytest_simbench.scene import Start
 from pytest_simbench.tuning.fitting import Fit
 from pytest_simbench.tuning.telling import Told
 from pytest_simbench.tuning.unknowns import Unknown
@@ -150,8 +149,7 @@ def test_all_that_is_said_of_a_fit() -> None:
     values = (("mass:drawer", 1.0, 2.34567, ""), ("spring:slider", 90.0, 1e-4, "no end below"))
     results = [Told(Unknown(name, was, was / 10, was * 10), now, now / 2, now * 2, why)
                for name, was, now, why in values]  # fmt: skip
-    log = Log(Trajectory(1.0, *(np.zeros((2, 2)),) * 3), ["hinge", "slider"], Start((), ()),
-              Start((), ()), "", {})  # fmt: skip
+    log = SimpleNamespace(joints=["hinge", "slider"], start=Start((), ()))
     first, last = (SimpleNamespace(metrics={"off": off, "turned": None}) for off in (12.345, 0.98))
     found: Any = SimpleNamespace(columns=["slider"], record=last)
     fitting: Any = SimpleNamespace(

@@ -1,27 +1,23 @@
-"""What of a run's options holds for each simulator, mode and profile, and who is left out."""
+"""What of a run's options holds for each simulator, mode and profile."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from pytest_simbench.cli.selection import Selection, environments, profiles_of
+from pytest_simbench.cli.selection import Selection, profiles_of
 from pytest_simbench.experiment.variants import Variant
 
 
 @pytest.mark.parametrize(("name", "ratio"), [("mujoco", "5"), ("mujoco==3.3.7", "7")])
-def test_the_profile_then_ours_then_the_user_s(
-    name: str, ratio: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A file's profile and a plain one, changed for all releases and for one. Where one profile of
-    a simulator is usable, it is; whoever names it is told why it is not."""
+def test_the_profile_then_ours_then_the_user_s(name: str, ratio: str, tmp_path: Path) -> None:
+    """A file's profile and a plain one, changed for all releases and for one."""
     path = tmp_path / "quick.toml"
     path.write_text('simulator = "mujoco"\nbase = "tuned"\n[settings]\ntimestep = 0.004\n')
     (plain, quick), files = profiles_of(("default", str(path)))
     changes = {"mujoco": {"impratio": "5", "cone": "pyramidal"}, "mujoco==3.3.7": {"impratio": "7"}}
-    chosen = Selection((name, "drake"), ("gui",), (plain, quick), changes, files=files)
+    chosen = Selection((name,), ("gui",), (plain, quick), changes, files=files)
     for label, step in ((plain, 0.002), (quick, 0.004)):
         given = vars(chosen.settings(name, label, {"timestep": 0.005, "impratio": 9}))
         assert (given["timestep"], given["impratio"]) == (0.005, float(ratio))
@@ -32,14 +28,3 @@ def test_the_profile_then_ours_then_the_user_s(
     assert told == (name, "gui", quick, 0.004, "tuned", None)
     own = {"timestep": 0.008, "impratio": ratio}
     assert case.changes == {**own, "iterations": 40, "cone": "pyramidal"}
-
-    monkeypatch.setattr(environments, "missing", lambda info: f"no {info.title}")
-    assert chosen.missing(name, quick) == chosen.unusable(name) == "no MuJoCo"
-    assert chosen.unusable(name, to_install=True) is None
-    elsewhere = replace(chosen, pythons={name: "python"})
-    assert (elsewhere.missing(name, quick), elsewhere.unusable(name)) == (None, None)
-    assert replace(chosen, specs={name: "ssh=x"}).unusable(name) is None
-    assert "is a profile of mujoco, not of drake" in str(chosen.missing("drake", quick))
-    assert elsewhere.unusable("drake") == "no Drake"  # by default
-    assert elsewhere.ready().simulators == (name,)
-    assert replace(elsewhere, named=("drake",)).ready().simulators == (name, "drake")
