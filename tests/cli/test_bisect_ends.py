@@ -43,9 +43,7 @@ def test_the_first_release_that_ends_elsewhere(
 
 
 def test_one_that_ends_halfway_is_good(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Within a millimetre two end alike, also at the very limit."""
     assert bisect_ends(search(tmp_path / "a", 0.0, 0.0, 16.0, 32.0, 32.0, moved=0.0)) == 0
-    assert bisect_ends(search(tmp_path / "b", 0.0, 0.0, 0.0, 0.0, 1.0)) == 1
     told = capsys.readouterr().out.replace(f"{tmp_path}", "DIR")
     assert_approved_line("bisect", told.replace("\n", " | "))
 

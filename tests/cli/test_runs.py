@@ -203,10 +203,8 @@ def test_all_that_is_said_of_a_run(
 def test_all_that_is_said_of_two_runs_together(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """They are shown as the whole that they are merged to, and so are their outcomes."""
     monkeypatch.setenv("COLUMNS", "110")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    ends: list[object] = []
     outcomes = RunOutcome(True, cut=("test_b", "test_a")), RunOutcome(None, looks=3, ended=False)
     for name, metrics, outcome in zip("ab", ({"placed": 1.0}, {}), outcomes, strict=True):
         folder = RunFolder(here / name)
@@ -214,8 +212,8 @@ def test_all_that_is_said_of_two_runs_together(
         told_whole(folder, outcome)
     with (here / "b/records.jsonl").open("a") as file:
         file.write("damaged\n")
-    ends += [report_runs(["a", "b"], verbose=True, record="yes", badge="badge.json")]
+    ends = [report_runs(["a", "b"], verbose=True, record="yes", badge="badge.json")]
     assert sorted(path.name for path in here.glob("[!.]*")) == ["a", "b", "badge.json"]
     ends += [report_runs(["b", "a"], output="both"), merge_runs(["b", "a"], output="whole")]
-    kept = [(here / name).read_text() for name in ("badge.json", "whole/outcome.json")]
-    assert_approved("said-together", "\n".join([capsys.readouterr().out, str(ends), *kept]))
+    texts = [(here / name).read_text() for name in ("badge.json", "whole/outcome.json")]
+    assert_approved("said-together", "\n".join([capsys.readouterr().out, str(ends), *texts]))

@@ -24,7 +24,5 @@ def test_the_profile_then_ours_then_the_user_s(name: str, ratio: str, tmp_path: 
         assert vars(chosen.settings(name, label))["timestep"] == step
     variant, ours = Variant(name, "gui", quick, 0.008, 0.004), {"iterations": 40, "cone": "x"}
     case = chosen.case(variant, ours, test="t", folder=Path())
-    told = (case.simulator, case.mode, case.profile, case.own_timestep, case.base, case.robot)
-    assert told == (name, "gui", quick, 0.004, "tuned", None)
-    own = {"timestep": 0.008, "impratio": ratio}
-    assert case.changes == {**own, "iterations": 40, "cone": "pyramidal"}
+    assert (case.mode, case.own_timestep, case.base) == ("gui", 0.004, "tuned")
+    assert case.changes == {**ours, "timestep": 0.008, "impratio": ratio, "cone": "pyramidal"}

@@ -105,7 +105,6 @@ def test_candidates_throw_there_within_their_limits() -> None:
 
 @pytest.mark.parametrize("name", ["panda", "ur5", "xarm7"])
 def test_the_fingers_open_across_a_plane_through_the_target(name: str) -> None:
-    """Also where the hand begins turned, to either side."""
     robot = find(name)
     *others, last = robot.arm_joints
     for turned in (-0.3, 0.4):

@@ -24,7 +24,6 @@ TEST: dict[str, Any] = {"simulator": "engine", "mode": "gui", "profile": "real",
     [(0.6, "FAIL", ""), (0.1, "PASS", ""), (0.5, "UNDECIDED", "about 295 more repetitions needed")],
 )
 def test_all_that_is_kept_of_a_claim(threshold: float, verdict: Any, advice: str) -> None:
-    """Of 20 repetitions whose mean is 0.5, of one that has no value and one that crashed."""
     rows = [*records("placed", [0.45, 0.55] * 10), *records("hit", [1.0]), failed(30)]
     result = ResultSet(rows, METRICS)
     result.strict = result.warns = False
