@@ -23,7 +23,7 @@ from pytest_simbench.motion.registry import find
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Failure
 from pytest_simbench.scene.policy import LoopError
-from pytest_simbench.tasks import Stacking, Throwing
+from pytest_simbench.tasks import Carrying, Stacking, Throwing
 from tests.conftest import workers
 from tests.made_up import MadeUp
 from tests.tiny import Falling
@@ -189,6 +189,10 @@ BAD: dict[str, tuple[dict[str, Any], str]] = {
     "setting": ({"settings": {"mujoco": {"step": 1}}}, "choose from "),
     "flat": ({"settings": {"timestep": 1}}, "by its name: {'mujoco': {'timestep': 1}}"),
     "seed": ({"seed": -1}, "seed=-1: give a whole number"),
+    "jitter": ({"jitter": -1}, "jitter=-1: give a number"),
+    "timeout": ({"timeout": 0}, "timeout=0: give a number"),
+    "jobs": ({"jobs": 0}, "jobs=0: give a whole number"),
+    "hand": ({"task": Carrying(), "robot": "so101"}, "robot: robot 'so101'"),
     "robot": ({"robot": "ur99"}, "robot=ur99: "),
     "robots": ({"robot": "all"}, "robot=all: give one of "),
     "resume": ({"resume": True}, "there is no run to resume in .simbench"),

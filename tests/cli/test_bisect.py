@@ -63,3 +63,7 @@ def test_a_test_with_two_tasks(tmp_path: Path) -> None:
     for name in ("crashed", "ram"):
         with pytest.raises(BadInput, match="repeat each in a test of its own"):
             replace(spilt, metric_name=name).result(0)
+    alone = replace(spilt, ran={"test_stacking[sim==1.9-headless]": ""}, releases=("1.9",))
+    assert replace(alone, metric_name="crashed").metric().name == "crashed"
+    with pytest.raises(BadInput, match="no metric is named 'nosuch'"):
+        replace(alone, metric_name="nosuch").metric()

@@ -42,6 +42,12 @@ def test_the_first_release_that_ends_elsewhere(
     assert "1.11 ends 31 mm from 1.8" not in told  # halving does not ask it
 
 
+def test_one_that_ends_halfway_is_good(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert bisect_ends(search(tmp_path / "a", 0.0, 0.0, 16.0, 32.0, 32.0, moved=0.0)) == 0
+    told = capsys.readouterr().out.replace(f"{tmp_path}", "DIR")
+    assert_approved_line("bisect", told.replace("\n", " | "))
+
+
 @pytest.mark.parametrize(
     ("last", "moved"),
     [(30.5, 40.0), (30.5, None), (0.9, None)],  # of the last what lies between is not asked

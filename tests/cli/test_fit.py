@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from pytest_simbench.cli.fit import _OutOfTime
+from pytest_simbench.cli.fit import _lines, _OutOfTime, _written
 from pytest_simbench.cli.main import main
+from pytest_simbench.scene import Start
 from pytest_simbench.tuning.fitting import Fit
+from pytest_simbench.tuning.telling import Told
+from pytest_simbench.tuning.unknowns import Unknown
+from tests.approval import assert_approved
 from tests.cli.command import said
+from tests.tasks.scripted_scene import SCENE
 
 DRIVE = """
 <mujoco model="drive">
@@ -135,3 +142,20 @@ def test_no_unknown_and_no_time(folder: Path, capsys: pytest.CaptureFixture[str]
     assert (
         "run holds another run, of fit[mujoco-headless-e0]; begin anew" in capsys.readouterr().err
     )
+
+
+def test_all_that_is_said_of_a_fit() -> None:
+    """Of what is determined and what is not, of joints that turn and slide, and of a misfit."""
+    values = (("mass:drawer", 1.0, 2.34567, ""), ("spring:slider", 90.0, 1e-4, "no end below"))
+    results = [Told(Unknown(name, was, was / 10, was * 10), now, now / 2, now * 2, why)
+               for name, was, now, why in values]  # fmt: skip
+    log = SimpleNamespace(joints=["hinge", "slider"], start=Start((), ()))
+    first, last = (SimpleNamespace(metrics={"off": off, "turned": None}) for off in (12.345, 0.98))
+    found: Any = SimpleNamespace(columns=["slider"], record=last)
+    fitting: Any = SimpleNamespace(
+        scene=SCENE, log=log, looks=17, first=first, misfit=lambda of: dict.fromkeys(of, 4.5678)
+    )
+    assert_approved("fit", "\n".join(_lines(results, fitting, found)))
+    assert json.loads(_written(results)) == {
+        "mass:drawer": {"value": 2.34567, "low": 2.34567 / 2, "high": 2.34567 * 2}
+    }

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,12 +14,18 @@ import pytest
 from pytest_simbench.cli.runs import merge_runs, report_runs
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.experiment.identity import file_stem_of
+from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.files import write_outcome
 from pytest_simbench.report.model.outcome import RunOutcome
+from tests.approval import assert_approved
 from tests.records.build import record
 from tests.report.model.test_claims import claim
+from tests.report.model.test_laws import ERROR, LAWS
+from tests.report.samples import METRICS
+from tests.report.samples import record as stacking
+from tests.report.test_whole import laws, scene, tasks
 
 
 def saved(folder: Path, seed: int, log: str, **changes: object) -> Record:
@@ -168,3 +176,44 @@ def test_a_mixture_is_refused(here: Path) -> None:
     RunFolder(here / "a").append(replace(first, seed=2, repetition=2, settings={"timestep": 0.5}))
     with pytest.raises(BadInput, match="a holds several configurations: settings.timest"):
         merge("a")
+
+
+def told_whole(folder: RunFolder, outcome: RunOutcome) -> None:
+    for name, metrics in {**METRICS, **dict.fromkeys(LAWS, ERROR)}.items():
+        folder.describe(TaskDescription(name, metrics))
+    write_outcome(folder.path, outcome)
+    folder.close()
+
+
+@pytest.mark.parametrize("run", [tasks, laws, scene], ids=lambda run: run.__name__)
+def test_all_that_is_said_of_a_run(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    run: Callable[[RunFolder], RunOutcome],
+) -> None:  # fmt: skip
+    monkeypatch.setenv("COLUMNS", "110")
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    folder = RunFolder(here / "a")
+    told_whole(folder, run(folder))
+    with (here / "a/repeatability.jsonl").open("a") as file:
+        file.write("damaged\n")
+    assert report_runs(["a"], record="yes") == 0
+    assert_approved(f"said-{run.__name__}", capsys.readouterr().out)
+
+
+def test_all_that_is_said_of_two_runs_together(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "110")
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    outcomes = RunOutcome(True, cut=("test_b", "test_a")), RunOutcome(None, looks=3, ended=False)
+    for name, metrics, outcome in zip("ab", ({"placed": 1.0}, {}), outcomes, strict=True):
+        folder = RunFolder(here / name)
+        folder.append(replace(stacking(simulator=name), metrics=metrics))
+        told_whole(folder, outcome)
+    with (here / "b/records.jsonl").open("a") as file:
+        file.write("damaged\n")
+    ends = [report_runs(["a", "b"], verbose=True, record="yes", badge="badge.json")]
+    assert sorted(path.name for path in here.glob("[!.]*")) == ["a", "b", "badge.json"]
+    ends += [report_runs(["b", "a"], output="both"), merge_runs(["b", "a"], output="whole")]
+    texts = [(here / name).read_text() for name in ("badge.json", "whole/outcome.json")]
+    assert_approved("said-together", "\n".join([capsys.readouterr().out, str(ends), *texts]))

@@ -104,7 +104,8 @@ def test_all_that_is_said_of_a_search(tmp_path: Path, capsys: pytest.CaptureFixt
     today = looks.today()
     done, tell = [today], progress(looks)
     for number, step in enumerate((0.003, 0.015, 0.001, 0.008, *[0.0029] * 7), 1):
-        one = looks.choose(f"trial{number}", {"timestep": step}, done)
+        more = {"cone": "elliptic"} if step == 0.008 else {}
+        one = looks.choose(f"trial{number}", {"timestep": step, **more}, done)
         done.append(one)
         tell(one, front(done, looks))
     better = Result(looks, done, done[1], "it is cheaper", _judge(looks, today, done[1], 500.0))

@@ -392,3 +392,9 @@ def test_no_release_is_one_sentence() -> None:
     assert unreleased("engine", "abc", map(str, range(6))) == (
         "'abc' is no version; the newest releases are 2, 3, 4, 5"
     )
+
+
+def test_environments_lie_with_the_user_s_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SIMBENCH_ENVIRONMENTS", raising=False)
+    monkeypatch.setenv("XDG_DATA_HOME", "/d")
+    assert environments.default_folder() == Path("/d/pytest-simbench/environments")

@@ -217,6 +217,7 @@ def test_every_row_goes_with_its_velocity_and_effort() -> None:
     latency = Latency(2 * TICK)
     first = ramp(0.0, 1.0, 11)
     (late,) = latency.late(first)
+    assert late.kind == "follow"
     for name in ARRAYS:
         assert np.array_equal(late.arguments[name][3:], first.arguments[name][1:-2])
     assert not late.arguments["velocity"][:3].any()  # held until the first set point arrives

@@ -70,6 +70,8 @@ def test_another_commit_is_another_version(monkeypatch: pytest.MonkeyPatch, tmp_
         )
         found.add(offers._code())
     assert len(found) == 2
+    monkeypatch.setattr(offers, "find_spec", lambda name: None)  # adapters that are not installed
+    assert offers._code() not in found
 
 
 def test_a_display_is_a_screen_or_what_makes_one(bare: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -163,6 +163,9 @@ def test_one_repetition_for_each_slot() -> None:
     soon.start()
     assert taken(pool) in ("a", "b")  # once one is free
     soon.join()
+    shared = Told([A, B])
+    shared._others = {A.address: A.slots}  # of another run
+    assert taken(shared) == "b"
 
 
 def test_what_is_tried_again_goes_elsewhere_where_it_can() -> None:

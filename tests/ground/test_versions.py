@@ -112,6 +112,7 @@ def test_older_releases_than_were_tried_are_refused_in_one_sentence(name: str) -
         assert not info.oldest_version  # the system has one release
         return
     assert info.tested(info.oldest_version)
+    assert not info.refused(info.oldest_version)
     assert re.fullmatch(r"the adapter was tested with .* not with 0\.0\.1", info.refused("0.0.1"))
     with pytest.raises(SimulatorError, match=r"==0\.0\.1: the adapter was tested"):
         adapter(f"{name}==0.0.1")

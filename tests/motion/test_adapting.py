@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from pytest_simbench.description.urdf import pose_of_rpy
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.motion.adapting import bound_joints
 from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.model import RobotModel
@@ -105,6 +107,12 @@ def test_a_joint_without_end_gets_limits(
     model = RobotModel(read_robot(small_arm(tmp_path, urdf=urdf)))
     assert model.lower[0] == pytest.approx(lower)
     assert model.upper[0] == pytest.approx(upper)
+
+
+def test_limits_are_made_where_there_are_none() -> None:
+    urdf = ET.fromstring('<robot><joint type="continuous"/></robot>')
+    assert (bound_joints(urdf), bound_joints(urdf)) == (True, False)
+    assert urdf[0][0].attrib == {"lower": repr(-2 * np.pi), "upper": repr(2 * np.pi)}
 
 
 def test_the_tool_centre_point_may_lie_beside_a_link(tmp_path: Path) -> None:

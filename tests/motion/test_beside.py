@@ -17,6 +17,7 @@ from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.planning import MotionPlanner
 from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import FloatArray, Pose, Robot, Scene
+from pytest_simbench.scene.robot import Closure, Coupling
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.simulator.registry import settings_of
 from tests.tasks.scripted import ScriptedProcess
@@ -56,6 +57,19 @@ def test_the_model_is_that_of_the_arm(name: str) -> None:
     assert beside.tool_pose(READY) == alone.tool_pose(READY)
     assert beside.robot.arm_joints == alone.robot.arm_joints
     assert Robot.from_wire(beside.robot.to_wire()).beside == (name,)
+
+
+def test_loops_and_couplings_of_both_stay() -> None:
+    pair, loop = Coupling("b", "a", 2.0), Closure("a link", "b link")
+    lead = Coupling("panda_finger_joint2", "panda_finger_joint1", 1.0)
+    parts = [Part(name, (0.0, 1.0, 0.0), slides=True, shape=BLOCK) for name in "ab"]
+    both = replace(mechanism("two", *parts, base=BESIDE), couplings=(pair,), closures=(loop,))
+    first = with_thing(Scene("s", robot=replace(panda(), couplings=(lead,))), both)
+    robot = first.robot
+    assert robot is not None
+    assert (robot.name, robot.couplings, robot.closures) == ("panda_and_two", (lead, pair), (loop,))
+    assert robot.joint_names == (*panda().joint_names, "a", "b")
+    assert (robot.beside, robot.self_collide) == (("a", "b"), True)
 
 
 def over(x: float, y: float) -> FloatArray:

@@ -103,6 +103,21 @@ def test_candidates_throw_there_within_their_limits() -> None:
         assert np.flatnonzero(velocity).tolist() == moving
 
 
+@pytest.mark.parametrize("name", ["panda", "ur5", "xarm7"])
+def test_the_fingers_open_across_a_plane_through_the_target(name: str) -> None:
+    robot = find(name)
+    *others, last = robot.arm_joints
+    for turned in (-0.3, 0.4):
+        bent = replace(last, initial_position=last.initial_position + turned)
+        joints = (*others, bent, *robot.joints[len(others) + 1 :])
+        model = RobotModel(replace(robot, joints=joints))
+        ready, moving = _in_plane(model, 1.2)
+        ready[moving] += 0.1
+        tool = model.tool_transform(ready)
+        across, away = tool.rotation[:, 1], np.array([1.2, 0.0, 0.0]) - tool.translation
+        assert (across[2], away @ across) == pytest.approx((0.0, 0.0), abs=1e-5)
+
+
 def test_joints_share_a_velocity_by_their_limits() -> None:
     """The second one alone makes the second part; shares 1 and 1 of the others make the first."""
     ways, limits = np.array([[1.0, 0.0, 2.0], [0.0, -1.0, 0.0]]), np.array([1.0, 4.0, 3.0])

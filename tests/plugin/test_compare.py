@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
+from pytest_simbench.plugin.compare import _name
 from pytest_simbench.records.baseline import read_baseline
 from tests.plugin.inner import FALLING, run_before, run_pytest
 
@@ -210,3 +211,10 @@ def test_a_claim_that_is_known_to_fail_does_so_in_junit_and_on_a_badge(
     badge = (pytester.path / "badge.json").read_text()
     assert "1 of 1 claims known to fail" in badge
     assert "yellow" in badge
+
+
+def test_a_saved_run_is_named_by_its_time_and_its_commit() -> None:
+    saved = {"datetime": "2026-11-01T10:00:09.123"}
+    for commit, told in (("unversioned", ""), ("89abcdef0123", ", commit 89abcdef01"), (None, "")):
+        found = _name({**saved, "commit_info": {"id": commit}})
+        assert found == f"the run saved 2026-11-01 10:00:09 UTC{told}"

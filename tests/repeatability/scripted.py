@@ -43,7 +43,7 @@ def operation(kind: str, phase: str, duration: float, goal: FloatArray | None = 
     """A wait, or a motion to a set point."""
     if kind == "wait":
         return Operation("wait", {"duration": duration}, phase)
-    rows = np.zeros((2, 1)) if goal is None else np.array([goal, goal])
+    rows = np.zeros((2, 1)) if goal is None else np.array([0 * goal, goal])
     return Operation(
         "follow",
         {"tick": duration, "position": rows, "velocity": rows, "effort": rows},

@@ -93,6 +93,8 @@ def test_each_metric_is_of_its_axis_and_turns_are_within_half_a_turn() -> None:
     assert metrics["way_error"] == pytest.approx(share * np.hypot(0.02, 0.05), rel=0.01)
     turned = compared(way(0.1, 0.0, 175.0), way(0.1, 0.0, -175.0, rows=90))[0]
     assert turned["turn_error"] == pytest.approx(10.0)
+    until_the_end = compared(way(0.08, 0.0, 0.0, rows=51), way(0.1, 0.0, 0.0, rows=51))
+    assert until_the_end[1]["real_displacement"] == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize("step", [1 / 240, 0.008, 0.016])
