@@ -50,7 +50,7 @@ numbers of processes, and what rounding leaves."""
 LONGEST, MANY = 2000, 24
 """Characters of a result that are held; of an array of more numbers its shape, ends and moments."""
 
-DIGEST = re.compile(r"\b[0-9a-f]{16}\b")
+DIGEST = re.compile(r"\b[0-9a-f]{16}\b|(?<=simbench-)\d+-[0-9a-f]+")
 
 EMPTY = {"None", "False", "[]", "{}", ""}
 """What is not told of a dataclass."""
@@ -101,6 +101,8 @@ class Running:
     test = ""
     results = 0
     """Of how many calls more the result is held."""
+    digits = 6
+    """Of the numbers in it."""
 
 
 def assert_approved_message(text: str, kind: str = "messages") -> None:
@@ -130,12 +132,12 @@ def watched(raises: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def in_words(value: Any, properties: bool = True) -> str:
-    """A result in words: numbers with six digits, dataclasses with what differs from their defaults
+    """A result in words: numbers of some digits, dataclasses with what differs from their defaults
     and with their properties, but not those of what a property gives."""
     tell = partial(in_words, properties=properties)
     value = value.item() if isinstance(value, np.generic) else value
     if isinstance(value, float):
-        return f"{value:.6g}" if not abs(value) < 1e-9 else "0"
+        return f"{value:.{Running.digits}g}" if not abs(value) < 1e-9 else "0"
     if isinstance(value, Record | Metric):
         return f"{value.test}#{value.repetition}" if isinstance(value, Record) else value.name
     if isinstance(value, np.ndarray):
@@ -157,7 +159,7 @@ def in_words(value: Any, properties: bool = True) -> str:
         given = {name: part for name, part, default in parts if part not in {*EMPTY, default}}
         for name in dir(kind) if properties else ():
             if isinstance(getattr(kind, name), property) and name[0] != "_":
-                with suppress(Exception):  # it has none
+                with suppress(Exception), np.errstate(all="ignore"):  # it has none
                     if (part := in_words(getattr(value, name), properties=False)) not in EMPTY:
                         given[name] = part
         return f"{kind.__name__}({', '.join(f'{n}={t}' for n, t in given.items())})"

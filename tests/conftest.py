@@ -174,6 +174,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 HELD = {"measure", "records", "recordings", "tuning", "ground", "description", "scene", "parity"}
 """Rooms of which tests hold word for word what functions return that they call."""
 
+UNHELD = {
+    "test_coverage",
+    "test_folders_are_made_for_what_is_written_alone",
+    "test_two_processes_append_without_mixing_lines",
+}
+"""Of statistics of many draws, of numbers of open files, and of what comes in any order."""
+
 RESULTS = 5
 """Of so many calls in each test."""
 
@@ -190,9 +197,10 @@ def messages(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
     held = not (drawn or request.node.get_closest_marker("engine"))
     monkeypatch.setattr(Running, "test", request.node.nodeid if held else "")
     monkeypatch.setattr(pytest, "raises", watched(pytest.raises))
-    room, slow = request.path.parent.name, getattr(request.node, "originalname", "") in SLOW
-    if held and not slow and room in HELD and request.path.name != "test_coverage.py":
+    room, name = request.path.parent.name, getattr(request.node, "originalname", "")
+    if held and room in HELD and not {name, request.path.stem} & {*SLOW, *UNHELD}:
         monkeypatch.setattr(Running, "results", RESULTS)
+        monkeypatch.setattr(Running, "digits", 4 if room == "tuning" else 6)  # searches end near
         for place, name, function in watched_results(request.module, room):
             monkeypatch.setattr(place, name, function)
 
