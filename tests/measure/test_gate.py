@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from pytest_simbench.measure import comparison, gate
-from pytest_simbench.measure.gate import GateReport, run_gate
+from pytest_simbench.measure.gate import GateReport, gate_runs, run_gate
 from pytest_simbench.measure.limits import Limit, parse_limits
-from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.description import TaskDescription
+from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.record import Record
 from tests.records.build import METRICS, failed, record
 
@@ -353,6 +354,28 @@ def test_a_test_that_is_broken_is_told_beside_its_limits() -> None:
         "test_stacking[engine-headless]: none of 3 repetitions finished (most often WorkerHung in "
         "settle); 2 of 2 did in the baseline",
     )
+
+
+def test_what_a_metric_meant_before_is_told_first() -> None:
+    here, there = TaskDescription("stacking", METRICS), replace(METRICS[0], better="lower")
+    before = RunContents("old", tuple(made([1.0] * 5)), {"stacking": here})
+    told = {"stacking": TaskDescription("stacking", (there, *METRICS[1:]))}
+    now = RunContents("new", tuple(made([0.5] * 5, settings={"timestep": 0.001})), told)
+    (lower,), (higher,) = (parse_limits("placed:5%", of) for of in ((there,), METRICS))
+    report = gate_runs(before, now, [lower])
+    assert report.differences[0].startswith("better of the metric placed of stacking was")
+    assert any("timestep" in difference for difference in report.differences[1:])
+    assert report.failures == ()  # less is better now
+    assert len(gate_runs(now, before, [higher]).changes) == 2
+    assert gate_runs(before, before).differences == ()
+
+
+def test_of_many_tests_the_first_three_are_named() -> None:
+    sides = (
+        [r for k in range(n) for r in made([1.0], test=f"{x}{k}")] for x, n in (("a", 3), ("b", 4))
+    )
+    (told,) = run(*[list(side) for side in sides], "placed:5%").failures
+    assert told.endswith("(this run has b0, b1, b2, ...; the baseline a0, a1, a2)")
 
 
 def test_runs_of_different_robots_are_not_comparable() -> None:

@@ -22,13 +22,21 @@ from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report.files import Written, columns_of, write_badge, write_files, write_tables
+from pytest_simbench.report.files import (
+    Written,
+    columns_of,
+    where,
+    write_badge,
+    write_files,
+    write_tables,
+)
 from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
 from pytest_simbench.report.markdown.run import render_run
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.model.summary import summarise
 from pytest_simbench.report.terminal import run as terminal
 from pytest_simbench.report.terminal.parts import render_changes
+from tests.approval import assert_approved
 from tests.hostile import HOSTILE, assert_harmless_markdown, assert_harmless_terminal
 
 from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run
@@ -62,8 +70,15 @@ def test_a_folder_is_all_that_it_takes(tmp_path: Path) -> None:
     assert [summary.task for summary in written.summaries] == ["stacking", "throwing"]
     before = {path: path.read_bytes() for path in tmp_path.glob("report.*")}
     assert len(before) == 3
+    assert_approved("csv", (tmp_path / "report.csv").read_text())
     written_in(RunFolder(tmp_path))
     assert {path: path.read_bytes() for path in before} == before
+
+
+def test_a_path_is_short_below_the_folder_and_whole_elsewhere() -> None:
+    page = Path("/a/run/report.html")
+    assert where(page, Path("/a")) == "report: run/report.html"
+    assert where(page, Path("/b")) == "report: /a/run/report.html"
 
 
 def test_reading_loads_no_planner(tmp_path: Path) -> None:

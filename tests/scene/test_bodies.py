@@ -31,6 +31,7 @@ from pytest_simbench.scene import (
     principal,
 )
 from pytest_simbench.scene.body import Solid
+from tests.approval import assert_approved, in_words
 
 SIGNS = list(product((-1.0, 1.0), repeat=3))
 
@@ -91,6 +92,32 @@ def test_a_round_body_is_what_it_says(body: Body) -> None:
     directions = np.array([UP, ASIDE, (0.6, 0.0, 0.8), (-0.48, 0.64, -0.6)])
     found = body.reach(directions)
     assert np.allclose(found, (inside @ directions.T).max(axis=0), atol=0.01)
+
+
+def test_bodies_are_what_somebody_approved() -> None:
+    """Each at a place, turned: what it is, what it reaches, and how deep it is in each other."""
+    at = Pose((0.1, -0.2, 0.3), (0.8, 0.0, 0.36, 0.48))
+    corners, frame = principal([(0, 0, 0), (0.6, 0, 0), (0, 0.5, 0), (0, 0, 0.4), (0.4, 0.4, 0.4)])
+    stool = Compound(
+        "stool", (Box("seat", (0.5, 0.5, 0.1), Pose()), Sphere("knob", 0.1, Pose((0, 0, 0.15)))),
+        at, 3.0, moments=(0.2, 0.3, 0.4), file_frame=Pose.at(0.1, 0, 0),
+    )  # fmt: skip
+    bodies = [
+        Box("box", (0.4, 0.5, 0.6), at, 2.0, moments=(0.1, 0.2, 0.25)),
+        *(body.moved_to(at) for body in ROUNDS),
+        ConvexMesh("rock", corners, at * frame, 2.0, linear_velocity=(0.1, 0.2, 0.3)),
+        stool.with_friction(0.7),
+    ]
+    directions = np.array([UP, ASIDE, (0.6, 0.0, 0.8), (-0.48, 0.64, -0.6)])
+    aside = Pose((0.25, 0.3, 0.1), (0.6, 0.8, 0.0, 0.0)) * at
+    lines = []
+    for body in bodies:
+        lines.append(f"{body.name}: {in_words([body, body.inertia(), body.solids()])}")
+        core = [] if body.name == "stool" else [body.core(0.2)[1]]
+        lines.append(in_words([body.reach(directions), body.reach_placed(directions), core]))
+        deep = [penetration(body, other.moved_to(aside), 0.2) for other in bodies]
+        lines.append(in_words([round(depth, 5) for depth in deep]))
+    assert_approved("bodies", "\n".join(lines))
 
 
 def test_how_deep_round_bodies_overlap() -> None:

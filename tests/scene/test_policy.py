@@ -78,6 +78,8 @@ def test_what_is_not_commanded_stays() -> None:
     assert at.position[7:].tolist() == [0.01, 0.01]
     at.after(np.zeros(7))
     assert at.position.tolist() == [0.0] * 7 + [0.01, 0.01]
+    assert np.array_equal(at.effort, SERVO.holding_effort(at.position))
+    assert np.array_equal(points().effort, SERVO.holding_effort(START))
     at.after(np.full(9, 0.02))
     assert at.position.tolist() == [0.02] * 9
 

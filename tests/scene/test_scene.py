@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.motion.panda import panda
-from pytest_simbench.scene import Box, Pose, Scene, SceneError, Sphere, Start, Trajectory
+from pytest_simbench.scene import Box, Pose, Scene, SceneError, Sphere, Start, Trajectory, Vector3
 from pytest_simbench.scene.plausibility import implausible
-from pytest_simbench.scene.pose import principal_axes, quaternion_of
+from pytest_simbench.scene.pose import principal_axes, quaternion_of, turn_of_z
 
 
 def box(name: str, x: float, **more: float) -> Box:
@@ -109,6 +109,54 @@ def test_composition_multiplies_matrices(a: Pose, b: Pose) -> None:
 def test_inverse_undoes(a: Pose) -> None:
     assert np.allclose((a * a.inverse()).matrix(), np.eye(4), atol=1e-9)
     assert Pose.from_array(a.as_array()) == a
+
+
+@pytest.mark.parametrize(
+    "way", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.48, -0.6, 0.64), (0.0, 1.0, 0.0), (0.0, 0.6, -0.8)]
+)
+def test_a_turn_of_z_is_the_shortest_to_a_direction(way: Vector3) -> None:
+    w, x, y, z = turn_of_z(np.array(way))
+    assert w == pytest.approx(math.cos(math.acos(way[2]) / 2))
+    assert math.hypot(w, x, y) == pytest.approx(1.0)
+    assert z == 0.0
+    assert Pose(quaternion=(w, x, y, z)).rotation()[:, 2] == pytest.approx(way)
+
+
+def test_a_turn_of_z_down_is_one_about_x() -> None:
+    assert turn_of_z(np.array([0.0, 0.0, -1.0])) == (0.0, 1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("turn", "tilt"), [(0, 0), (30, 30), (45, 45), (80, 10), (90, 0), (130, 40), (-20, 20)]
+)
+def test_a_tilt_is_to_the_nearest_face(turn: float, tilt: float) -> None:
+    half = math.radians(turn) / 2
+    for axis in np.eye(3)[:2]:
+        leaning = Pose.at(1, 2, 3, yaw=0.7) * Pose(
+            quaternion=(math.cos(half), *(math.sin(half) * axis).tolist())
+        )
+        assert math.degrees(leaning.tilt()) == pytest.approx(tilt, abs=1e-5)
+    assert Pose.at(1, 2, 3, yaw=0.5).translated(0.1, 0.2, 0.4) == Pose.at(1.1, 2.2, 3.4, yaw=0.5)
+
+
+def test_set_points_between_the_rows_by_hand() -> None:
+    """Rows at 0, 0.1 and 0.2 s; the last is held to the end of a step that ends later."""
+    rows = np.array([[0.0, 0.0], [1.0, 2.0], [2.0, 0.0]])
+    found = Trajectory(0.1, rows, 2 * rows, -rows).resampled(0.04)
+    right = np.array([[0.4, 0.8], [0.8, 1.6], [1.2, 1.6], [1.6, 0.8], [2.0, 0.0]])
+    assert found.tick == 0.04
+    assert found.position == pytest.approx(right)
+    assert found.velocity == pytest.approx(2 * right)
+    assert found.effort == pytest.approx(-right)
+    once = Trajectory(0.1, rows, rows, rows)
+    assert once.resampled(0.15).position == pytest.approx(np.array([[1.5, 1.0]]))
+    assert once.resampled(0.5).position == pytest.approx(np.array([[2.0, 0.0]]))
+    assert once.duration == pytest.approx(0.2)
+    held = Trajectory.holding(0.1, rows[1], rows[2])
+    assert held.position.tolist() == [[1.0, 2.0]] * 2
+    assert held.velocity.tolist() == [[0.0, 0.0]] * 2
+    assert held.effort.tolist() == [[2.0, 0.0]] * 2
+    assert not Trajectory.holding(0.1, rows[1]).effort.any()
 
 
 @given(st.floats(-math.pi + 1e-6, math.pi - 1e-6))
