@@ -2,7 +2,7 @@
 
 Who changes one on purpose writes them anew, and reads what changed:
 
-    rm -r tests/approved/messages
+    rm -r tests/approved/{messages,results}
     SIMBENCH_APPROVE=1 pytest tests -m "not engine" -n 2 --dist loadfile; git diff tests/approved
 """
 
@@ -18,6 +18,7 @@ from difflib import unified_diff
 from functools import cache, partial, wraps
 from inspect import isclass, isfunction, isgeneratorfunction
 from itertools import islice
+from math import isclose
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -34,6 +35,9 @@ HOW = "if it is meant, write it with SIMBENCH_APPROVE=1 (tests/approval.py)"
 
 LONG = re.compile(r"\d+\.\d{7,}(e-?\d+)?")
 """Numbers whose last digits another processor may round otherwise."""
+
+FRACTION = re.compile(r"(?<![\w.])-?\d+(?:\.\d+(?:e-?\d+)?|e-?\d+)(?![\w.])")
+"""Numbers that are rounded."""
 
 PASSING = (
     (re.compile(r"(\n--- last lines|; its last words:).*", re.DOTALL), ""),
@@ -86,13 +90,32 @@ def assert_approved_line(name: str, line: str) -> None:
         kept = file.read_text().splitlines() if file.exists() else []
         file.write_text("\n".join([*sorted({*kept, line}), ""]))
         _lines.cache_clear()
-    assert line in _lines(name), f"tests/approved/{name}.txt does not hold it: {line}; {HOW}"
+        _alike.cache_clear()
+    held = line in _lines(name) or any(_near(line, kept) for kept in _alike(name, _words(line)))
+    assert held, f"tests/approved/{name}.txt does not hold it: {line}; {HOW}"
 
 
 @cache
 def _lines(name: str) -> frozenset[str]:
     file = APPROVED / f"{name}.txt"
     return frozenset(file.read_text().splitlines()) if file.exists() else frozenset()
+
+
+def _words(line: str) -> str:
+    return FRACTION.sub("#", line)
+
+
+@cache
+def _alike(name: str, words: str) -> list[str]:
+    """Lines of the file that differ in fractions alone."""
+    return [line for line in _lines(name) if _words(line) == words]
+
+
+def _near(line: str, kept: str) -> bool:
+    """Whether the fractions differ by how processors round: by two in the last digit at most."""
+    pairs = zip(FRACTION.findall(line), FRACTION.findall(kept), strict=True)
+    near = 2 * 10.0 ** (1 - Running.digits)
+    return all(isclose(float(a), float(b), rel_tol=near, abs_tol=1e-8) for a, b in pairs)
 
 
 class Running:
