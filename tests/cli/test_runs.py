@@ -25,7 +25,7 @@ from tests.report.model.test_claims import claim
 from tests.report.model.test_laws import ERROR, LAWS
 from tests.report.samples import METRICS
 from tests.report.samples import record as stacking
-from tests.report.test_whole import laws, scene, tasks
+from tests.report.test_whole import laws, policies, releases, scene, tasks
 
 
 def saved(folder: Path, seed: int, log: str, **changes: object) -> Record:
@@ -185,7 +185,7 @@ def told_whole(folder: RunFolder, outcome: RunOutcome) -> None:
     folder.close()
 
 
-@pytest.mark.parametrize("run", [tasks, laws, scene], ids=lambda run: run.__name__)
+@pytest.mark.parametrize("run", [tasks, laws, scene, releases, policies])
 def test_all_that_is_said_of_a_run(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
     run: Callable[[RunFolder], RunOutcome],

@@ -65,11 +65,11 @@ def test_loops_and_couplings_of_both_stay() -> None:
     parts = [Part(name, (0.0, 1.0, 0.0), slides=True, shape=BLOCK) for name in "ab"]
     both = replace(mechanism("two", *parts, base=BESIDE), couplings=(pair,), closures=(loop,))
     first = with_thing(Scene("s", robot=replace(panda(), couplings=(lead,))), both)
-    robot = first.robot
-    assert robot is not None
+    robot = first.arm
     assert (robot.name, robot.couplings, robot.closures) == ("panda_and_two", (lead, pair), (loop,))
-    assert robot.joint_names == (*panda().joint_names, "a", "b")
-    assert (robot.beside, robot.self_collide) == (("a", "b"), True)
+    assert robot.joint_names == (*panda().joint_names, *robot.beside) != panda().joint_names
+    near, far = (("link/base", f"link/panda_link{number}") for number in (1, 2))
+    assert (near in first.apart, far in first.apart, robot.self_collide) == (False, True, True)
 
 
 def over(x: float, y: float) -> FloatArray:

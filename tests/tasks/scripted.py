@@ -10,7 +10,8 @@ A subclass may let cubes fly that the hand lets go (`fall`, `fly`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -25,6 +26,7 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.tasks import Jitter, Task
 from pytest_simbench.tasks.base import CUBE_SIZE, Outcome
+from tests.approval import assert_approved_message
 
 REACH = 0.03
 """A cube whose centre is nearer than this to the tool centre point is between the fingers [m]."""
@@ -268,6 +270,7 @@ def perform(
     seed: int = 1,
     jitter: Jitter | None = None,
     process: ScriptedProcess | None = None,
+    says: bool = True,
 ) -> tuple[Outcome, ScriptedProcess]:
     """A task's score in the world of the script, every mishap of which must have happened."""
     process = process or ScriptedProcess()
@@ -275,7 +278,23 @@ def perform(
     world = ScriptedWorld(process, task.scene(seed, jitter or Jitter()))
     outcome = task.perform(world, seed, lambda *count: process.counts.append(count))
     assert not process.pending, f"never happened: {process.pending}"
+    asked = dict(Counter(asked.phase for asked in process.asked))
+    told = rounded([asked, process.counts, process.marks, outcome])
+    if says:
+        assert_approved_message(f"{task.name} seed {seed}: {told}")
     return outcome, process
+
+
+def rounded(value: Any) -> Any:
+    """Without digits that differ between processors, and of long lists eight items."""
+    value = value.item() if isinstance(value, np.number) else getattr(value, "__dict__", value)
+    if isinstance(value, float):
+        return round(value, 5) + 0.0
+    if isinstance(value, Mapping):
+        return {key: rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [rounded(item) for item in value[:: -(-len(value) // 8) or 1]]
+    return value
 
 
 def stacked(number: int) -> Cube:
