@@ -387,4 +387,6 @@ def test_runs_of_different_robots_are_not_comparable() -> None:
         "not comparable"
     )
     assert sentence in run(own, ur5, "placed:5%").notes
+    two = [*ur5, *made([1.0] * 5, test="t[sim-headless-so101]", robot={"name": "so101"})]
+    assert sentence.replace("ur5", "so101 and ur5") in run(own, two, "placed:5%").notes
     assert not any("robot" in note for note in run(ur5, ur5, "placed:5%").notes)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from pytest_simbench.tasks import Settling, Tossing
 from pytest_simbench.tasks.base import cube
 from pytest_simbench.tuning import target as module
 from pytest_simbench.tuning.target import (
+    FAILED,
     FIRST_CHOSEN,
     FIRST_JUDGED,
     TIMES,
@@ -71,6 +74,28 @@ def test_shares_are_what_is_missing() -> None:
     assert of.together({of.chosen[0]: 0.5}) == 0.5
     lost = record(metrics={"landed": None})
     assert of.error(of.chosen[0], lost, lost) == 1.0  # all of it
+
+
+@pytest.mark.parametrize(
+    ("kind", "better", "right", "value", "error"),
+    [
+        ("yes_no", "higher", None, 0.25, 0.75),
+        ("yes_no", "lower", None, 0.25, 0.25),
+        ("value", "lower", None, 0.25, 0.25),
+        ("value", None, 2.0, 0.5, 1.5),
+        ("yes_no", "higher", 0.5, 0.75, 0.25),
+        ("yes_no", "lower", None, math.nan, 1.0),
+        ("value", "lower", None, math.nan, FAILED),
+    ],
+)
+def test_an_error_is_from_what_is_right(
+    kind: Any, better: Any, right: float | None, value: float, error: float
+) -> None:
+    metric = Metric("x", "x", kind=kind, better=better)
+    aims: dict[str, Any] = {"references": {} if right is None else {"x": right}}
+    look = Look(type("Aimed", (Falling,), aims)())
+    had = record(metrics={"x": value})
+    assert replace(of_falling(), metric=metric).error(look, had, had) == pytest.approx(error)
 
 
 @pytest.mark.parametrize(
