@@ -21,7 +21,6 @@ from itertools import islice
 from pathlib import Path
 from types import ModuleType
 from typing import Any
-from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
@@ -51,7 +50,6 @@ LONGEST, MANY = 2000, 24
 """Characters of a result that are held; of an array of more numbers its shape, ends and moments."""
 
 DIGEST = re.compile(r"\b[0-9a-f]{16}\b|(?<=simbench-)\d+-[0-9a-f]+")
-
 EMPTY = {"None", "False", "[]", "{}", ""}
 """What is not told of a dataclass."""
 
@@ -99,10 +97,8 @@ class Running:
     """The test whose messages are held; none of one that needs an engine or draws at random."""
 
     test = ""
-    results = 0
-    """Of how many calls more the result is held."""
-    digits = 6
-    """Of the numbers in it."""
+    results, digits = 0, 6
+    """Of how many calls more the result is held, and how many digits of its numbers."""
 
 
 def assert_approved_message(text: str, kind: str = "messages") -> None:
@@ -145,8 +141,6 @@ def in_words(value: Any, properties: bool = True) -> str:
             return tell(value.tolist())
         ends = tell([value.flat[0], value.flat[-1], value.mean(), value.std()])
         return f"{value.dtype.kind} {tell(value.shape)} {ends}"
-    if isinstance(value, Element):
-        return " ".join(tostring(value, "unicode").split())
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{tell(k)}: {tell(v)}" for k, v in value.items()) + "}"
     if isinstance(value, set | frozenset):
@@ -171,32 +165,22 @@ def watched_results(module: ModuleType, room: str) -> Iterator[tuple[Any, str, A
     """Where functions and public methods of the room stand that the module of tests has, and what
     calls them and holds what they return."""
 
-    def hold(function: Callable[..., Any], result: Any) -> None:
-        if result is not None and Running.results:
-            Running.results -= 1
-            line = f"{function.__qualname__} -> {in_words(result)[:LONGEST]}"
-            assert_approved_message(DIGEST.sub("#", line), "results")
-
     def watched(function: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(function)
         def call(*args: Any, **named: Any) -> Any:
             left, Running.results = Running.results, 0  # not what it calls itself
             try:
                 result = function(*args, **named)
+                result = [*result] if isgeneratorfunction(function) else result
             finally:
                 Running.results = left
-            hold(function, result)
-            return result
+            if result is not None and left:
+                Running.results -= 1
+                line = f"{function.__qualname__} -> {in_words(result)[:LONGEST]}"
+                assert_approved_message(DIGEST.sub("#", line), "results")
+            return iter(result) if isgeneratorfunction(function) else result
 
-        @wraps(function)
-        def give(*args: Any, **named: Any) -> Iterator[Any]:
-            found = []
-            for item in function(*args, **named):
-                found.append(item)
-                yield item
-            hold(function, found)
-
-        return give if isgeneratorfunction(function) else call
+        return call
 
     home = f"pytest_simbench.{room}."
     ours = [v for v in vars(module).items() if getattr(v[1], "__module__", "").startswith(home)]

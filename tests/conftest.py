@@ -174,15 +174,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 HELD = {"measure", "records", "recordings", "tuning", "ground", "description", "scene", "parity"}
 """Rooms of which tests hold word for word what functions return that they call."""
 
-UNHELD = {
-    "test_coverage",
-    "test_folders_are_made_for_what_is_written_alone",
-    "test_two_processes_append_without_mixing_lines",
-}
+UNHELD = {"test_coverage", "test_folders_are_made_for_what_is_written_alone",
+          "test_two_processes_append_without_mixing_lines"}  # fmt: skip
 """Of statistics of many draws, of numbers of open files, and of what comes in any order."""
-
-RESULTS = 5
-"""Of so many calls in each test."""
 
 LEAN = "-p no:hypothesispytest"
 """Hypothesis' own plugin imports all of Hypothesis when it sums up: 0.6 CPU seconds a run. What
@@ -199,7 +193,7 @@ def messages(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(pytest, "raises", watched(pytest.raises))
     room, name = request.path.parent.name, getattr(request.node, "originalname", "")
     if held and room in HELD and not {name, request.path.stem} & {*SLOW, *UNHELD}:
-        monkeypatch.setattr(Running, "results", RESULTS)
+        monkeypatch.setattr(Running, "results", 5)  # so many calls of each test
         monkeypatch.setattr(Running, "digits", 4 if room == "tuning" else 6)  # searches end near
         for place, name, function in watched_results(request.module, room):
             monkeypatch.setattr(place, name, function)

@@ -77,14 +77,8 @@ def about(path: Path, **changes: Any) -> np.ndarray:
         ({"body_names": np.array(["a", "b"])}, "not those of its scene"),
         ({"joint_names": np.array(list("abcdefghi"))}, "no positions of the joints"),
         ({"faces_0": np.full((3, 3), 10**6)}, "a face of a mesh has no vertices"),
-        (
-            {"vertices_0": np.eye(3), "faces_0": np.array([[0, 1, 3]])},
-            "a face of a mesh has no ver",
-        ),
-        (
-            {"vertices_0": np.eye(3), "faces_0": np.array([[-1, 0, 1]])},
-            "a face of a mesh has no ve",
-        ),
+        ({"vertices_0": np.eye(3), "faces_0": np.array([[0, 1, 3]])}, "a face of a mesh has no"),
+        ({"vertices_0": np.eye(3), "faces_0": np.array([[-1, 0, 1]])}, "a face of a mesh has no"),
         ({"faces_0": np.zeros((3, 3))}, "a face of a mesh has no vertices"),
         ({"faces_0": np.zeros((3, 4), int)}, "its meshes' faces are not finite numbers"),
         ({"vertices_0": np.zeros((9, 2))}, "its meshes' vertices are not finite numbers"),

@@ -6,109 +6,47 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import pytest
-
-from pytest_simbench.records.checked import (
-    DEEPEST,
-    LARGEST_INTEGER,
-    CheckError,
-    Count,
-    convert,
-    plain,
-    schema,
-    short,
-    writable,
-)
+from pytest_simbench.records import checked
+from pytest_simbench.records.checked import DEEPEST, LARGEST_INTEGER, convert, plain
+from tests.approval import assert_approved, in_words
 
 
 def nested(levels: int) -> Any:
     """A number inside so many lists."""
-    value: Any = 1
-    for _ in range(levels):
-        value = [value]
-    return value
-
-
-@dataclass(frozen=True)
-class Part:
-    count: Count
-    names: tuple[str, ...] = ()
+    return 1 if not levels else [nested(levels - 1)]
 
 
 @dataclass(frozen=True)
 class Whole:
-    parts: list[Part]
+    counts: list[checked.Count]
+    names: tuple[str, ...] = ()
     size: float = 0.5
 
 
-SOUND: list[Any] = [None, True, 3, -2.5, "text", "ä", [], {}, LARGEST_INTEGER, -LARGEST_INTEGER]
-
-
-@pytest.mark.parametrize("value", [*SOUND, [*SOUND, SOUND], {"a": SOUND, "ä": {"b": 1e308}}])
-def test_what_can_be_used_stays(value: Any) -> None:
-    assert plain(value) == value
-
-
-def test_what_no_file_takes_becomes_a_question_mark() -> None:
-    """Of keys and texts at any depth; other letters stay."""
-    assert writable("a\ud800ä") == "a?ä"
+def test_what_can_be_used_stays_but_for_what_no_file_takes() -> None:
+    sound: Any = [None, True, -2.5, "ä", [], LARGEST_INTEGER, {"ä": nested(DEEPEST - 2)}]
+    assert plain(sound) == sound
+    assert plain(nested(DEEPEST)) == nested(DEEPEST)
+    assert checked.writable("a\ud800ä") == "a?ä"
     found = plain({"\udc80": ["\ud800", {"x": "\ud800b", "y": "é"}], "z": "\ud800"})
     assert found == {"?": ["?", {"x": "?b", "y": "é"}], "z": "?"}
 
 
-@pytest.mark.parametrize(
-    ("value", "said"),
-    [
-        (math.nan, "'' must be a finite number, not nan"),
-        ([{"a": 1}, {"b": [math.inf]}], "'b' must be a finite number, not inf"),
-        ({"a": {"b": -math.inf, "c": 1.0}}, "'a.b' must be a finite number, not -inf"),
-        ({"a": [LARGEST_INTEGER + 1]}, "'a' is larger than any number of ours"),
-        ({"a": {"b": -LARGEST_INTEGER - 1}}, "'a.b' is larger than any number of ours"),
-        ({"a": nested(DEEPEST)}, f"'a' is nested more than {DEEPEST} levels deep"),
-        (nested(DEEPEST + 1), f"'' is nested more than {DEEPEST} levels deep"),
-    ],
-)
-def test_what_cannot_be_used_is_told_with_its_place(value: Any, said: str) -> None:
-    with pytest.raises(CheckError) as error:
-        plain(value)
-    assert str(error.value) == said
-
-
-def test_so_deep_it_may_be() -> None:
-    assert plain(nested(DEEPEST)) == nested(DEEPEST)
-
-
-def test_data_become_what_they_are_of() -> None:
-    told = {"parts": [{"count": 0, "names": ["a"], "more": 1}], "size": 2}
-    assert convert(told, Whole) == Whole([Part(0, ("a",))], 2.0)
-    assert convert({"parts": []}, Whole) == Whole([])
-
-
-@pytest.mark.parametrize(
-    "value",
-    [
-        3, None, [], {}, {"parts": {}}, {"parts": None}, {"parts": [3]}, {"parts": [{}]},
-        {"parts": [{"count": -1}]}, {"parts": [{"count": "1"}]}, {"parts": [], "size": "1"},
-        {"parts": [{"count": 1, "names": [2]}]}, {"parts": [{"count": 1, "names": None}]},
-    ],
-)  # fmt: skip
-def test_what_they_are_not_is_told_with_its_place(value: Any) -> None:
-    for where in ("", "here.there"):
-        with pytest.raises(CheckError):
-            convert(value, Whole, where)
-
-
-def test_an_older_schema_is_read_and_a_newer_one_is_not() -> None:
-    assert [schema({"schema": k}, 3) for k in (1, 3)] == [1, 3]
-    assert schema({}, 3) == 1
-    for data in ({"schema": 4}, {"schema": 0}, {"schema": -1}, {"schema": "1"}, {"schema": None}):
-        with pytest.raises(CheckError, match=r"schema .* was written by a newer pytest-simbench"):
-            schema(data, 3)
-    for wrong in (3, None, [1], "x"):
-        with pytest.raises(CheckError, match=f"is wanted, not {type(wrong).__name__}$"):
-            schema(wrong, 3)
-
-
-@pytest.mark.parametrize("value", ["x" * 500, list(range(500)), 3, {"a": "b"}, None, "a\nb"])
-def test_a_value_is_told_in_short(value: Any) -> None:
-    assert len(short(value)) <= 60
+def test_the_rest_is_told_with_its_place() -> None:
+    asked: list[tuple[Any, list[Any]]] = [
+        (plain, [math.nan, [{"b": [math.inf]}], {"a": {"b": -math.inf}}, nested(DEEPEST + 1)]),
+        (plain, [{"a": {"b": [10 * LARGEST_INTEGER]}}, {"a": nested(DEEPEST)}, -(10**301)]),
+        (lambda of: convert(of, Whole), [3, {"counts": [{}]}, {"counts": [2]}]),
+        (lambda of: convert(of, Whole, "here"), [3, None, [], {}, {"counts": {}}]),
+        (lambda of: convert(of, Whole, "in.it"), [{"counts": [0], "size": "1"}, {"counts": [-1]}]),
+        (lambda of: convert(of, Whole), [{"counts": [0], "names": ["a"], "size": 2, "more": 1}]),
+        (lambda of: checked.schema(of, 3), [{"schema": k} for k in (1, 3, 4, 0, "1")] + [{}, [1]]),
+        (checked.short, ["x" * 58, "x" * 59, list(range(50)), {"a": "b"}]),
+    ]
+    lines = []
+    for function, value in ((function, value) for function, of in asked for value in of):
+        try:
+            lines.append(f"{str(value)[:60]}: {in_words(function(value))}")
+        except checked.CheckError as error:
+            lines.append(f"{str(value)[:60]}: {error}")
+    assert_approved("checked", "\n".join(lines))

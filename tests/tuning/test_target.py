@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -77,24 +76,19 @@ def test_shares_are_what_is_missing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "better", "right", "value", "error"),
+    ("metric", "value", "error"),
     [
-        ("yes_no", "higher", None, 0.25, 0.75),
-        ("yes_no", "lower", None, 0.25, 0.25),
-        ("value", "lower", None, 0.25, 0.25),
-        ("value", None, 2.0, 0.5, 1.5),
-        ("yes_no", "higher", 0.5, 0.75, 0.25),
-        ("yes_no", "lower", None, math.nan, 1.0),
-        ("value", "lower", None, math.nan, FAILED),
+        (Metric("x", "x", kind="yes_no"), 0.25, 0.75),
+        (Metric("x", "x", kind="yes_no", better="lower"), 0.25, 0.25),
+        (Metric("x", "x", better="lower"), 0.25, 0.25),
+        (Metric("aim", "aim", better=None), 0.5, 1.5),
+        (Metric("x", "x", kind="yes_no", better="lower"), math.nan, 1.0),
+        (Metric("x", "x", better="lower"), math.nan, FAILED),
     ],
 )
-def test_an_error_is_from_what_is_right(
-    kind: Any, better: Any, right: float | None, value: float, error: float
-) -> None:
-    metric = Metric("x", "x", kind=kind, better=better)
-    aims: dict[str, Any] = {"references": {} if right is None else {"x": right}}
-    look = Look(type("Aimed", (Falling,), aims)())
-    had = record(metrics={"x": value})
+def test_an_error_is_from_what_is_right(metric: Metric, value: float, error: float) -> None:
+    look = Look(type("Aimed", (Falling,), {"references": {"aim": 2.0}})())
+    had = record(metrics={metric.name: value})
     assert replace(of_falling(), metric=metric).error(look, had, had) == pytest.approx(error)
 
 
