@@ -169,12 +169,13 @@ def watched_results(module: ModuleType, room: str) -> Iterator[tuple[Any, str, A
         @wraps(function)
         def call(*args: Any, **named: Any) -> Any:
             left, Running.results = Running.results, 0  # not what it calls itself
+            asked = sys._getframe(1).f_globals.get("__name__", "").startswith("tests.")
             try:
                 result = function(*args, **named)
                 result = [*result] if isgeneratorfunction(function) else result
             finally:
                 Running.results = left
-            if result is not None and left:
+            if result is not None and left and asked:
                 Running.results -= 1
                 line = f"{function.__qualname__} -> {in_words(result)[:LONGEST]}"
                 assert_approved_message(DIGEST.sub("#", line), "results")
