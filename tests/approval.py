@@ -2,7 +2,7 @@
 
 Who changes one on purpose writes them anew, and reads what changed:
 
-    rm -r tests/approved/{messages,results}
+    rm -r tests/approved/messages
     SIMBENCH_APPROVE=1 pytest tests -m "not engine" -n 2 --dist loadfile; git diff tests/approved
 """
 
@@ -12,22 +12,15 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from difflib import unified_diff
-from functools import cache, partial, wraps
-from inspect import isclass, isfunction, isgeneratorfunction
+from functools import cache
 from itertools import islice
-from math import isclose
 from pathlib import Path
-from types import ModuleType
 from typing import Any
-from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
-
-from pytest_simbench.records.metrics import Metric
-from pytest_simbench.records.record import Record
 
 APPROVED = Path(__file__).parent / "approved"
 
@@ -35,9 +28,6 @@ HOW = "if it is meant, write it with SIMBENCH_APPROVE=1 (tests/approval.py)"
 
 LONG = re.compile(r"\d+\.\d{7,}(e-?\d+)?")
 """Numbers whose last digits another processor may round otherwise."""
-
-FRACTION = re.compile(r"(?<![\w.])-?\d+(?:\.\d+(?:e-?\d+)?|e-?\d+)(?![\w.])")
-"""Numbers that are rounded."""
 
 PASSING = (
     (re.compile(r"(\n--- last lines|; its last words:).*", re.DOTALL), ""),
@@ -50,14 +40,6 @@ PASSING = (
 )
 """What is another one each time: logs, folders, ports, names of runs, addresses, digests, seconds,
 numbers of processes, and what rounding leaves."""
-
-LONGEST, MANY = 2000, 24
-"""Characters of a result that are held; of an array of more numbers its shape, ends and moments."""
-
-DIGEST = re.compile(r"\b[0-9a-f]{16}\b|(?<=simbench-)\d+-[0-9a-f]+")
-
-EMPTY = {"None", "False", "[]", "{}", ""}
-"""What is not told of a dataclass."""
 
 PYTHON = (3, 11)
 """Whose words stand in messages; other releases word theirs differently."""
@@ -90,9 +72,7 @@ def assert_approved_line(name: str, line: str) -> None:
         kept = file.read_text().splitlines() if file.exists() else []
         file.write_text("\n".join([*sorted({*kept, line}), ""]))
         _lines.cache_clear()
-        _alike.cache_clear()
-    held = line in _lines(name) or any(_near(line, kept) for kept in _alike(name, _words(line)))
-    assert held, f"tests/approved/{name}.txt does not hold it: {line}; {HOW}"
+    assert line in _lines(name), f"tests/approved/{name}.txt does not hold it: {line}; {HOW}"
 
 
 @cache
@@ -101,35 +81,14 @@ def _lines(name: str) -> frozenset[str]:
     return frozenset(file.read_text().splitlines()) if file.exists() else frozenset()
 
 
-def _words(line: str) -> str:
-    return FRACTION.sub("#", line)
-
-
-@cache
-def _alike(name: str, words: str) -> list[str]:
-    """Lines of the file that differ in fractions alone."""
-    return [line for line in _lines(name) if _words(line) == words]
-
-
-def _near(line: str, kept: str) -> bool:
-    """Whether the fractions differ by how processors round: by two in the last digit at most."""
-    pairs = zip(FRACTION.findall(line), FRACTION.findall(kept), strict=True)
-    near = 2 * 10.0 ** (1 - Running.digits)
-    return all(isclose(float(a), float(b), rel_tol=near, abs_tol=1e-8) for a, b in pairs)
-
-
 class Running:
     """The test whose messages are held; none of one that needs an engine or draws at random."""
 
     test = ""
-    results = 0
-    """Of how many calls more the result is held."""
-    digits = 6
-    """Of the numbers in it."""
 
 
-def assert_approved_message(text: str, kind: str = "messages") -> None:
-    """The running test has such a message, or such a result."""
+def assert_approved_message(text: str) -> None:
+    """The running test has such a message."""
     if not Running.test or sys.version_info[:2] != PYTHON:
         return
     file, _, function = Running.test.partition("[")[0].partition("::")
@@ -137,7 +96,7 @@ def assert_approved_message(text: str, kind: str = "messages") -> None:
         text = passing.sub(told, text)
     text = LONG.sub(_rounded, text)
     place = file.removeprefix("tests/").removesuffix(".py").replace("/", "-")
-    assert_approved_line(f"{kind}/{place}", ascii(f"{function}: {text}")[1:-1])
+    assert_approved_line(f"messages/{place}", ascii(f"{function}: {text}")[1:-1])
 
 
 def watched(raises: Callable[..., Any]) -> Callable[..., Any]:
@@ -154,77 +113,17 @@ def watched(raises: Callable[..., Any]) -> Callable[..., Any]:
     return lambda *args, **named: told(raises(*args, **named), asked="match" in named)
 
 
-def in_words(value: Any, properties: bool = True) -> str:
-    """A result in words: numbers of some digits, dataclasses with what differs from their defaults
-    and with their properties, but not those of what a property gives."""
-    tell = partial(in_words, properties=properties)
-    value = value.item() if isinstance(value, np.generic) else value
+def in_words(value: Any) -> str:
+    """A result in words: numbers with six digits, dataclasses by their fields."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
     if isinstance(value, float):
-        return f"{value:.{Running.digits}g}" if not abs(value) < 1e-9 else "0"
-    if isinstance(value, Record | Metric):
-        return f"{value.test}#{value.repetition}" if isinstance(value, Record) else value.name
-    if isinstance(value, np.ndarray):
-        if value.size <= MANY:
-            return tell(value.tolist())
-        ends = tell([value.flat[0], value.flat[-1], value.mean(), value.std()])
-        return f"{value.dtype.kind} {tell(value.shape)} {ends}"
-    if isinstance(value, Element):
-        return " ".join(tostring(value, "unicode").split())
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{tell(k)}: {tell(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, set | frozenset):
-        return "{" + ", ".join(sorted(map(tell, value))) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(tell, value)) + "]"
+        return f"{value:.6g}" if abs(value) > 1e-9 else "0"
     if is_dataclass(value):
-        kind = type(value)
-        parts = ((f.name, tell(getattr(value, f.name)), tell(f.default)) for f in fields(value))
-        given = {name: part for name, part, default in parts if part not in {*EMPTY, default}}
-        for name in dir(kind) if properties else ():
-            if isinstance(getattr(kind, name), property) and name[0] != "_":
-                with suppress(Exception), np.errstate(all="ignore"):  # it has none
-                    if (part := in_words(getattr(value, name), properties=False)) not in EMPTY:
-                        given[name] = part
-        return f"{kind.__name__}({', '.join(f'{n}={t}' for n, t in given.items())})"
-    plain = isinstance(value, str | int | Path) or value is None
-    return " ".join(str(value).split()) if plain else type(value).__name__
-
-
-def watched_results(module: ModuleType, room: str) -> Iterator[tuple[Any, str, Any]]:
-    """Where functions and public methods of the room stand that the module of tests has, and what
-    calls them and holds what they return."""
-
-    def hold(function: Callable[..., Any], result: Any) -> None:
-        if result is not None and Running.results:
-            Running.results -= 1
-            line = f"{function.__qualname__} -> {in_words(result)[:LONGEST]}"
-            assert_approved_message(DIGEST.sub("#", line), "results")
-
-    def watched(function: Callable[..., Any]) -> Callable[..., Any]:
-        @wraps(function)
-        def call(*args: Any, **named: Any) -> Any:
-            left, Running.results = Running.results, 0  # not what it calls itself
-            try:
-                result = function(*args, **named)
-            finally:
-                Running.results = left
-            hold(function, result)
-            return result
-
-        @wraps(function)
-        def give(*args: Any, **named: Any) -> Iterator[Any]:
-            found = []
-            for item in function(*args, **named):
-                found.append(item)
-                yield item
-            hold(function, found)
-
-        return give if isgeneratorfunction(function) else call
-
-    home = f"pytest_simbench.{room}."
-    ours = [v for v in vars(module).items() if getattr(v[1], "__module__", "").startswith(home)]
-    places: list[tuple[Any, str, Any]] = [(module, *item) for item in ours]
-    places += [(kind, *item) for _, kind in ours if isclass(kind) for item in vars(kind).items()]
-    for place, name, value in places:
-        if isfunction(value) and not name.startswith(("_", "assert_")):
-            yield place, name, watched(value)
+        of = {f.name: getattr(value, f.name) for f in fields(value)}
+        return f"{type(value).__name__}{in_words(of)}"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{k}: {in_words(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(in_words, value)) + "]"
+    return str(value)

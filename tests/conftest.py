@@ -30,7 +30,7 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.tasks import Task
-from tests.approval import Running, assert_approved_line, watched, watched_results
+from tests.approval import Running, assert_approved_line, watched
 
 with contextlib.suppress(ImportError):
     # dask imports it. It takes from Python's own finder what lists packages, and adds a finder of
@@ -171,19 +171,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if item not in slow]
 
 
-HELD = {"measure", "records", "recordings", "tuning", "ground", "description", "scene", "parity"}
-"""Rooms of which tests hold word for word what functions return that they call."""
-
-UNHELD = {
-    "test_coverage",
-    "test_folders_are_made_for_what_is_written_alone",
-    "test_two_processes_append_without_mixing_lines",
-}
-"""Of statistics of many draws, of numbers of open files, and of what comes in any order."""
-
-RESULTS = 5
-"""Of so many calls in each test."""
-
 LEAN = "-p no:hypothesispytest"
 """Hypothesis' own plugin imports all of Hypothesis when it sums up: 0.6 CPU seconds a run. What
 perturbs asks Hypothesis itself."""
@@ -197,12 +184,6 @@ def messages(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
     held = not (drawn or request.node.get_closest_marker("engine"))
     monkeypatch.setattr(Running, "test", request.node.nodeid if held else "")
     monkeypatch.setattr(pytest, "raises", watched(pytest.raises))
-    room, name = request.path.parent.name, getattr(request.node, "originalname", "")
-    if held and room in HELD and not {name, request.path.stem} & {*SLOW, *UNHELD}:
-        monkeypatch.setattr(Running, "results", RESULTS)
-        monkeypatch.setattr(Running, "digits", 4 if room == "tuning" else 6)  # searches end near
-        for place, name, function in watched_results(request.module, room):
-            monkeypatch.setattr(place, name, function)
 
 
 @pytest.fixture

@@ -212,9 +212,13 @@ def test_few_values_or_none_say_nothing_of_the_mean() -> None:
     assert interval([2.0], COUNT) == Interval(2.0, -math.inf, math.inf, 1, "none")
     few = interval([1.0, 2.0, 3.0, 4.0], COUNT)
     assert (few.method, few.mean, few.n) == ("none", 2.5, FEWEST - 1)
-    nothing = interval([], SHARE)
+    nothing = interval([], SHARE, 0.9)
     assert math.isnan(nothing.mean)
     assert (nothing.n, nothing.low, nothing.high) == (0, -math.inf, math.inf)
+    assert (nothing.method, nothing.confidence) == ("none", 0.9)
+    assert (
+        interval([1.0], COUNT, 0.8).confidence == interval([2.0] * 6, COUNT, 0.8).confidence == 0.8
+    )
 
 
 def test_a_yes_or_no_is_exact_and_a_part_of_one_is_a_share() -> None:

@@ -86,6 +86,7 @@ def twice(*last: float) -> list[Record]:
         ),
         # What grows a little with each release.
         (row("glide", 3.0, 4.0, 5.0, 6.5), "2.0: glide is missed by more (3x -> 6.5x)"),
+        (row("glide", 9.0, 9.0, 9.0, 3.0), "2.0: glide is missed by less (9x -> 3x)"),
         # Two releases are enough, and a build comes after them.
         ([*asked("glide", "1.9", 3.0), *asked("glide", "1.10", 0.5)],
          "1.10: glide is kept (3x -> 0.5x)"),

@@ -112,6 +112,15 @@ def test_the_cheapest_step_that_keeps_the_law_and_the_cheapest_within_an_error()
     assert kept.step == 0.002
 
 
+@pytest.mark.parametrize(("unit", "size"), [("m", 4.9), ("%", 200.0), ("", 4.9)])
+def test_rounding_is_of_what_the_law_says_or_of_all_that_percent_are_of(
+    unit: str, size: float
+) -> None:
+    found = sweeps([law(h, 0.1) for h in STEPS], {"fall": (Metric("error", "error", unit),)})
+    for point in found[0].lines[0].points:
+        assert point.rounding == pytest.approx(rounding(size, round(1 / point.step)))
+
+
 def test_a_tolerance_between_two_steps_and_beyond_them() -> None:
     known = {0.004: 0.16, 0.001: 0.01}
     assert tolerance_at(0.002, known) == pytest.approx(0.04)  # the second power of the step

@@ -130,9 +130,6 @@ def test_odd_edges_lose_a_row(tmp_path: Path) -> None:
     made.finish()
     assert made.problem == ""
     with av.open(str(made.path)) as container:
-        stream = container.streams.video[0]
-        assert (stream.codec_context.name, stream.pix_fmt) == ("h264", "yuv420p")
-        assert (container.format.name, stream.average_rate) == ("mov,mp4,m4a,3gp,3g2,mj2", 25)
         assert [(frame.width, frame.height) for frame in container.decode(video=0)] == [(50, 36)]
 
 

@@ -76,6 +76,8 @@ def test_every_form_gives_the_same_records(tmp_path: Path, form: str) -> None:
         ('{"benchmarks": {}}', "malformed: 'benchmarks' is not a list"),
         ('{"benchmarks": [3, {"extra_info": 4}]}', "holds no repetition of a simulator"),
         ('{"benchmarks": [{"extra_info": {"simbench": 1}}]}', "does not hold repetitions"),
+        ('{"benchmarks": [{"extra_info": {"simbench": {"repetitions": []}}}]}', "does not hold"),
+        ('{"benchmarks": [{"extra_info": {"simbench": {"shared": {}}}}]}', "does not hold repet"),
         (
             '{"benchmarks": [{"fullname": "t", "extra_info": '
             '{"simbench": {"shared": {}, "repetitions": [1]}}}]}',

@@ -172,6 +172,9 @@ def test_rows_are_ranked_only_where_the_same_was_asked() -> None:
     assert ranked(settings={"timestep": 9.0})
     rows = [series([replace(ours, settings={"task.levels": k})])[0] for k in (3, 3, 5)]
     assert [comparable(rows[0], row) for row in rows] == [True, True, False]
+    (untold,) = series([replace(ours, settings={})])  # what only one tells makes no difference
+    assert comparable(rows[0], untold)
+    assert comparable(untold, rows[0])
     for name, value in {"jitter": 50.0, "protocol": "paper", "mode": "gui", "profile": "x"}.items():
         assert not ranked(**{name: value})
     runs = [record(1, test=f"test_{n}[{s}]", simulator=s) for s in "ab" for n in "xy"]

@@ -22,14 +22,7 @@ from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report.files import (
-    Written,
-    columns_of,
-    where,
-    write_badge,
-    write_files,
-    write_tables,
-)
+from pytest_simbench.report.files import Written, columns_of, write_badge, write_files, write_tables
 from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
 from pytest_simbench.report.markdown.run import render_run
 from pytest_simbench.report.model.report import Report
@@ -73,12 +66,6 @@ def test_a_folder_is_all_that_it_takes(tmp_path: Path) -> None:
     assert_approved("csv", (tmp_path / "report.csv").read_text())
     written_in(RunFolder(tmp_path))
     assert {path: path.read_bytes() for path in before} == before
-
-
-def test_a_path_is_short_below_the_folder_and_whole_elsewhere() -> None:
-    page = Path("/a/run/report.html")
-    assert where(page, Path("/a")) == "report: run/report.html"
-    assert where(page, Path("/b")) == "report: /a/run/report.html"
 
 
 def test_reading_loads_no_planner(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from pytest_simbench.ground.errors import PolicyError
 from pytest_simbench.motion.kinematics import FASTEST, Servo
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Gripper, Pose, Scene
+from pytest_simbench.scene import policy as module
 from pytest_simbench.scene.policy import Command, Function, LoopError, Policy, Rhythm, as_policy
 from pytest_simbench.scene.set_points import SetPoints, Sight, _changed, written
 
@@ -64,6 +66,10 @@ def test_what_is_a_policy() -> None:
     assert isinstance(made, Function)
     assert (made.name, made.rate) == ("nothing", 20.0)
     assert as_policy(made) is made
+    for kind, name in ((type("Push", (), {}), "Push"), (type("Push", (), {"name": "p"}), "p")):
+        assert module.name_of(kind()) == name
+    assert (module.name_of(made), module.name_of(nothing)) == ("nothing", "nothing")
+    assert (as_policy(nothing).rate, Function(partial(nothing)).name) == (Policy.rate, "function")
     for wrong in (3, "act", Policy):
         with pytest.raises(LoopError, match="is no policy"):
             as_policy(wrong)

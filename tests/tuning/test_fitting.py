@@ -15,7 +15,7 @@ from pytest_simbench.scene import FloatArray, Start, Trajectory
 from pytest_simbench.tasks import Fitting, Log
 from pytest_simbench.tuning.fitting import Fit, State
 from pytest_simbench.tuning.target import TuningError
-from pytest_simbench.tuning.telling import Told, told
+from pytest_simbench.tuning.telling import Told, _follow, told
 from pytest_simbench.tuning.unknowns import changed, unknowns
 from tests.tasks.scripted_scene import SCENE
 
@@ -185,6 +185,14 @@ def test_what_fails_in_part_of_the_range_does_no_harm_and_all_of_it_is_told() ->
 
     found, _ = fit(["spring:slider"], motion=partly, scene_truth={**TRUTH, "spring:slider": 900.0})
     assert found["spring:slider"].value == pytest.approx(90, rel=0.01)
+
+
+def test_residuals_like_those_before_count_as_fewer() -> None:
+    """(1 + c) / (1 - c) of the correlation c, where that is more than chance: 3 / sqrt(n)."""
+    assert _follow(np.ones(100)) == pytest.approx(1.99 / 0.01)  # c is 99 of 100
+    assert _follow(np.repeat([1.0, -1.0] * 10, 5)) == pytest.approx((100 + 61) / (100 - 61))
+    assert _follow(np.tile([1.0, -1.0], 50)) == 1.0
+    assert _follow(np.zeros(4)) == 1.0
 
 
 def test_a_log_that_is_too_short_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

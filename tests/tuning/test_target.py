@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from pytest_simbench.tasks import Settling, Tossing
 from pytest_simbench.tasks.base import cube
 from pytest_simbench.tuning import target as module
 from pytest_simbench.tuning.target import (
+    FAILED,
     FIRST_CHOSEN,
     FIRST_JUDGED,
     TIMES,
@@ -71,6 +73,23 @@ def test_shares_are_what_is_missing() -> None:
     assert of.together({of.chosen[0]: 0.5}) == 0.5
     lost = record(metrics={"landed": None})
     assert of.error(of.chosen[0], lost, lost) == 1.0  # all of it
+
+
+@pytest.mark.parametrize(
+    ("metric", "value", "error"),
+    [
+        (Metric("x", "x", kind="yes_no"), 0.25, 0.75),
+        (Metric("x", "x", kind="yes_no", better="lower"), 0.25, 0.25),
+        (Metric("x", "x", better="lower"), 0.25, 0.25),
+        (Metric("aim", "aim", better=None), 0.5, 1.5),
+        (Metric("x", "x", kind="yes_no", better="lower"), math.nan, 1.0),
+        (Metric("x", "x", better="lower"), math.nan, FAILED),
+    ],
+)
+def test_an_error_is_from_what_is_right(metric: Metric, value: float, error: float) -> None:
+    look = Look(type("Aimed", (Falling,), {"references": {"aim": 2.0}})())
+    had = record(metrics={metric.name: value})
+    assert replace(of_falling(), metric=metric).error(look, had, had) == pytest.approx(error)
 
 
 @pytest.mark.parametrize(
