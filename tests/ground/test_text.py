@@ -123,6 +123,7 @@ def test_no_cell_is_a_formula(text: str) -> None:
     (row,) = csv.reader(io.StringIO(file.getvalue()))
     assert row[0] == "first"
     assert row[2] == "-1.5"
+    assert for_csv("=1; @b-c") == "'=1;' @b-c"
 
 
 @pytest.mark.parametrize("value", [-1, -1.5, True, None, float("nan")])
