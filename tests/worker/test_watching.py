@@ -16,7 +16,7 @@ from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.scene import Box, Pose, Scene, Sphere, Wrench
 from pytest_simbench.simulator import DivergedError, ParityError
 from pytest_simbench.worker.server import Server
-from pytest_simbench.worker.watching import Watch
+from pytest_simbench.worker.watching import Obstacles, Watch
 from pytest_simbench.worker.wire import pack
 from tests.conftest import ADAPTERS
 from tests.worker.cheats import CUBE, LATER, UNTIL
@@ -200,3 +200,16 @@ def test_what_flies_is_accelerated_by_gravity_alone(near: str) -> None:
             toy.bodies[0, 9] += faster
             with pytest.raises(ParityError) if told and faster else nullcontext():
                 watch.look(toy.steps, toy.joints, toy.bodies)
+
+
+def test_how_far_it_is_to_all_that_a_ball_can_touch() -> None:
+    """The faces of a wall, another ball's box, and those of the arm's links; not itself."""
+    balls = [Sphere(name, 0.1, Pose.at(x, 3.0, 1.0), 0.1) for name, x in (("a", 0.0), ("b", 1.0))]
+    scene = Scene("s", (*balls, Box("wall", (9.0, 0.2, 9.0), Pose.at(0.0, 3.5, 0.0))))
+    bodies = np.array([[*ball.pose.as_array(), *[0.0] * 6] for ball in balls])
+    for robot, y, apart in ((None, 3.0, 0.4), (None, 1.0, 0.9), (panda(), -0.3, None)):
+        bodies[:, 1:3] = (y, 1.0) if robot is None else (y, 0.1)
+        of = replace(scene, robot=robot)
+        boxes = Obstacles(of, expected_quantities(of, Toy().settings))
+        found, _ = boxes.distances(bodies, np.zeros(9), [0, 1])
+        assert found == pytest.approx(apart) if apart else 0.1 < found < 0.25  # the arm's base

@@ -63,6 +63,9 @@ def test_each_repetition_is_there_once_for_all_plots(tmp_path: Path) -> None:
         for dot in (*line.dots, *line.lost)
     }
     assert numbers == set(range(80))
+    told = [r["cause"] for r in found["repetitions"] if r["status"] == "failed"]
+    assert told == ["WorkerDied in pick: the worker was killed by SIGSEGV",
+                    *["WorkerHung in settle: no answer within 60 s"] * 2]  # fmt: skip
 
 
 def test_a_failure_is_told_with_the_end_of_its_log(tmp_path: Path) -> None:
