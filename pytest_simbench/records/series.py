@@ -205,14 +205,16 @@ def _difference(key: str, value: object) -> str:
     return f"{key.removeprefix('settings.')}={bare(value)}"
 
 
-def comparable(a: Series, b: Series) -> bool:
-    """Whether one row may be said to beat the other: the same was asked of both."""
+def comparable(a: Series, b: Series, *, profiles: bool = False) -> bool:
+    """Whether one row may be said to beat the other: the same was asked of both, or of two
+    `profiles` of one simulator."""
     if a.label != b.label and a.key[3:] != b.key[3:]:
         return False
     first, second = (
         {key: text(value) for key, value in told(row.records, "rank").items()} for row in (a, b)
     )
-    return all(second.get(key, value) == value for key, value in first.items())
+    beside = {"profile"} if profiles else set()
+    return all(second.get(key, first[key]) == first[key] for key in first.keys() - beside)
 
 
 def told(records: Sequence[Record], use: Use = "pool") -> dict[str, object]:

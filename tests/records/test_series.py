@@ -177,6 +177,9 @@ def test_rows_are_ranked_only_where_the_same_was_asked() -> None:
     assert comparable(untold, rows[0])
     for name, value in {"jitter": 50.0, "protocol": "paper", "mode": "gui", "profile": "x"}.items():
         assert not ranked(**{name: value})
+    real, paper = (series([replace(ours, profile="real", **of)])[0] for of in ({}, {"jitter": 9.0}))
+    assert comparable(rows[0], real, profiles=True)
+    assert not comparable(rows[0], paper, profiles=True)
     runs = [record(1, test=f"test_{n}[{s}]", simulator=s) for s in "ab" for n in "xy"]
     found = {(row.key.simulator, row.label): row for row in series(runs)}
     assert comparable(found["a", "test_x"], found["b", "test_x"])

@@ -188,6 +188,19 @@ def test_the_headline_counts_many_and_tells_a_single_one() -> None:
     assert cost == "Cost: CPU s per simulated s: 0.048; RAM: 150 MB."
 
 
+def test_profiles_are_compared_where_one_simulator_stands_alone() -> None:
+    rows = [
+        record(repetition=k, seed=k, profile=profile, metrics={"placed": placed})
+        for profile, placed in (("default", 0.2), ("tuned", 0.9))
+        for k in range(8)
+    ]
+    told = headline(summarise(rows, METRICS))[1]
+    assert "placed: mujoco (tuned) ahead (behind: mujoco (default))" in told
+    others = [replace(row, simulator="b", profile="tuned") for row in rows[:8]]
+    told = headline(summarise([*rows, *others], METRICS))[1]
+    assert "placed: mujoco (tuned) ahead (behind: b (tuned))" in told
+
+
 def test_a_task_without_metrics_of_the_study_is_told_by_its_first_two() -> None:
     metrics = tuple(Metric(name, name, "m", "lower") for name in ("one", "two", "three"))
     found = task({"a": 0.1, "b": 0.9})
