@@ -191,6 +191,8 @@ def test_residuals_like_those_before_count_as_fewer() -> None:
     """(1 + c) / (1 - c) of the correlation c, where that is more than chance: 3 / sqrt(n)."""
     assert _follow(np.ones(100)) == pytest.approx(1.99 / 0.01)  # c is 99 of 100
     assert _follow(np.repeat([1.0, -1.0] * 10, 5)) == pytest.approx((100 + 61) / (100 - 61))
+    threes = np.repeat([*[1.0, -1.0] * 16, 1.0], [*[3] * 32, 4])  # c is (99 - 2 * 32) of 100
+    assert _follow(threes) == pytest.approx(1.35 / 0.65)
     assert _follow(np.tile([1.0, -1.0], 50)) == 1.0
     assert _follow(np.zeros(4)) == 1.0
 
