@@ -168,7 +168,7 @@ def _of_claims(
 def _difference(more: Sequence[float], bounded: bool) -> Interval:
     """By how much errors are larger, for each seed. Of proportions the upper end is the lower of
     two, each wrong in 2.5 % at most: that of bets, and how often a seed can be worse at all."""
-    n, mean = len(more), round(sum(more) / len(more), 12)  # what remains of 0.2 - 0.1 - 0.1 is 0
+    n, mean = len(more), round(sum(more) / len(more), 12)  # 0.3 - 0.1 - 0.2 is 0, no -3e-17
     if bounded:
         bets = betting([(d + 1) / 2 for d in more])
         losses = proportion(sum(d > 0 for d in more), n)

@@ -11,7 +11,6 @@ import re
 import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 from pytest_simbench.measure.differences import Difference, differences
 from pytest_simbench.measure.modes import compare_modes
@@ -211,8 +210,9 @@ def _summary(
     if not phenomenon:
         sides = {place: row.records for place, row in enumerate(found)}
         alone = len({row.records[0].simulator for row in found}) == 1
-        asked = partial(comparable, profiles=alone)
-        apart = differences(sides, metrics, lambda a, b: asked(found[a], found[b]), references)
+        apart = differences(
+            sides, metrics, lambda a, b: comparable(found[a], found[b], profiles=alone), references
+        )
         ordered = [record for row in found for record in row.records]
         modes = compare_modes(ordered, metrics)
     return TaskSummary(
