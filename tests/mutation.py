@@ -103,13 +103,16 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
 
 
 class Times:
-    """A plugin: how long each test took [s]."""
+    """A plugin: how long each test took [s], and which failed."""
 
     def __init__(self) -> None:
         self.seconds: Counter[str] = Counter()
+        self.failed: set[str] = set()
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         self.seconds[plain(report.nodeid)] += int(1000 * report.duration) / 1000
+        if report.failed:
+            self.failed.add(plain(report.nodeid))
 
 
 def plain(test: str) -> str:
@@ -118,9 +121,8 @@ def plain(test: str) -> str:
 
 
 def learn(arguments: Sequence[str], side_by_side: str) -> None:
-    """Run the tests once, and note which reaches which line and how long each takes."""
-    from coverage.sqldata import CoverageData
-
+    """Run the tests once, and note which reaches which line and how long each takes. One that fails
+    without a fault is not asked."""
     KEPT.mkdir(exist_ok=True)
     for old in KEPT.glob("coverage*"):
         old.unlink()
@@ -129,22 +131,32 @@ def learn(arguments: Sequence[str], side_by_side: str) -> None:
     times = Times()
     given = ["-n", side_by_side, "-p", "tests.mutation", "-p", "no:cacheprovider", "--cov"]
     covered = ["--cov-context=test", "--cov-report=", f"--cov-config={KEPT / 'session.ini'}"]
-    if pytest.main([*arguments, *given, *covered], plugins=[times]):
-        sys.exit("the tests must pass before faults are planted")
-    numbers = {test: number for number, test in enumerate(times.seconds)}
+    pytest.main([*arguments, *given, *covered], plugins=[times])
+    passed = {test: s for test, s in times.seconds.items() if test not in times.failed}
+    kept = {"arguments": arguments, "seconds": passed, "reach": reached(list(passed))}
+    (KEPT / "learnt.json").write_text(json.dumps(kept))
+
+
+def reached(tests: Sequence[str]) -> dict[str, dict[int, list[int]]]:
+    """Of each line of each file, the numbers of the tests that reach it."""
+    from coverage.exceptions import DataError
+    from coverage.sqldata import CoverageData
+
+    numbers = {test: number for number, test in enumerate(tests)}
     reach: dict[str, dict[int, set[int]]] = defaultdict(lambda: defaultdict(set))
     for path in KEPT.glob("coverage*"):
         data = CoverageData(str(path))
-        data.read()
+        try:
+            data.read()
+        except DataError:  # of a process that was killed
+            continue
         for file in data.measured_files():
             for line, contexts in data.contexts_by_lineno(file).items():
-                tests = {plain(context.partition("|")[0]) for context in contexts}
+                known = {plain(context.partition("|")[0]) for context in contexts}
                 reach[str(Path(file).relative_to(ROOT))][line] |= {
-                    numbers[test] for test in tests & numbers.keys()
+                    numbers[test] for test in known & numbers.keys()
                 }
-    known = {file: {n: sorted(t) for n, t in lines.items()} for file, lines in reach.items()}
-    kept = {"arguments": arguments, "seconds": times.seconds, "reach": known}
-    (KEPT / "learnt.json").write_text(json.dumps(kept))
+    return {file: {n: sorted(t) for n, t in lines.items()} for file, lines in reach.items()}
 
 
 class Asking:
@@ -179,7 +191,7 @@ class Asking:
     def tests(self, fault: Fault, items: dict[str, Any]) -> list[str]:
         """The tests to ask; of a line within a statement, those that reach the statement."""
         every, lines = list(self.seconds), self.reach.get(fault.file, {})
-        reached = next((lines[str(n)] for n in range(fault.line, 0, -1) if str(n) in lines), [])
+        there = next((lines[str(n)] for n in range(fault.line, 0, -1) if str(n) in lines), [])
         home = f"tests/{fault.file.split('/')[1]}/"
 
         def length(test: str) -> float:
@@ -187,7 +199,7 @@ class Asking:
 
         chosen: list[str] = []
         total = 0.0
-        for test in sorted((every[n] for n in reached if every[n] in items), key=length):
+        for test in sorted((every[n] for n in there if every[n] in items), key=length):
             total += self.seconds[test]
             if chosen and total > MOST:
                 break
@@ -277,6 +289,8 @@ def planted(fault: Fault) -> Iterator[tuple[CodeType, CodeType]]:
 
 def ask(seed: int, count: int, under: str) -> None:
     """Plant faults; one that was asked before is not asked again."""
+    if not (KEPT / "learnt.json").exists():
+        sys.exit("nothing is learnt yet: python tests/mutation.py learn -n 2 tests")
     learnt = json.loads((KEPT / "learnt.json").read_text())
     answers = KEPT / f"{seed}{under.replace('/', '-')}.jsonl"
     answers.touch()
