@@ -197,11 +197,20 @@ def test_parallel_repetitions_report_each_for_itself() -> None:
         both.wait(10)
         desk.progress.phase(f"phase{number}")
         desk.progress.count(number, 15, "cubes")
+        if not both.wait(10):
+            at_once(1, lambda _: desk.progress.phase("of nobody"))
         both.wait(10)
 
     at_once(2, work)
     told = "repetitions 1, 2 of 20  phase1  1/15 cubes | phase2  2/15 cubes"
     assert desk.progress.line() == f"{TEST}  {told}"
+
+
+def test_a_helper_thread_reports_for_the_only_repetition() -> None:
+    desk = Desk(20, width=140)
+    desk.progress.repetition(3, seed=3)
+    at_once(1, lambda _: desk.progress.phase("place"))
+    assert desk.progress.line() == f"{TEST}  repetition 3 of 20  place"
 
 
 @pytest.mark.parametrize(

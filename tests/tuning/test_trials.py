@@ -28,6 +28,16 @@ def test_cost_and_error_are_those_of_the_records(tmp_path: Path) -> None:
     assert seeds[0] == (300_001, 0.002)
 
 
+def test_others_may_take_four_times_as_long_as_todays_longest(tmp_path: Path) -> None:
+    looks, executor = trials(tmp_path, lambda s, k: 1.0)
+    end = executor.end
+    executor.end = lambda experiment, k: (
+        {**end(experiment, k)[0], "seconds": {"total": 9.1 * k}}, None,
+    )  # fmt: skip
+    looks.today()
+    assert looks.timeout == 146.0  # of 9.1, 18.2, 27.3 and 36.4 s
+
+
 @pytest.mark.parametrize(
     ("name", "half", "seed", "timeout"),
     [("today", "", FIRST_CHOSEN, 7.0), ("converged", "held_out", FIRST_JUDGED, 7.0),

@@ -150,7 +150,7 @@ PICTURES: dict[str, tuple[int, str, Fill]] = {
 def _phases(figure: Any, rows: Sequence[Row]) -> None:
     """CPU and RAM along the task's phases, a line for each row."""
     order = merged_order(row.by_phase for row in rows)
-    panels = figure.subplots(1, 2, squeeze=False)[0]
+    panels = figure.subplots(1, 2)
     for kind, (axis, label) in enumerate(zip(panels, ("CPU, % of a core", "RAM, MB"), strict=True)):
         for place, (row, name) in enumerate(zip(rows, short_labels(rows), strict=True)):
             known = [phase for phase in order if phase in row.by_phase]

@@ -185,7 +185,7 @@ def _scale(low: float, high: float, log: bool) -> Callable[[float], float]:
 
 def _ticks(low: float, high: float, log: bool) -> list[float]:
     """Both ends and what lies between them."""
-    if log and low < high:
+    if log:
         return [low, math.sqrt(low * high), high]
     return [low + (high - low) * k / 4 for k in range(5)] if low < high else [low]
 
