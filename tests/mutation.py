@@ -272,16 +272,17 @@ def functions(code: CodeType) -> Iterator[CodeType]:
 
 @contextmanager
 def planted(fault: Fault) -> Iterator[tuple[CodeType, CodeType]]:
-    """The fault stands in its file; gives the code of the function, old and new."""
+    """The fault stands in its file; gives the code of the function, old and new: that of the module
+    where it is in a default argument."""
     path = ROOT / fault.file
     before, status = path.read_bytes(), path.stat()
-    old, new = (compile(text, str(path), "exec") for text in (before, fault.source))
-    first = [code for code in functions(old) if code.co_firstlineno <= fault.line]
-    function = max(first, key=lambda code: code.co_firstlineno)
+    both = [compile(text, str(path), "exec") for text in (before, fault.source)]
+    pairs = zip(*map(functions, both), strict=False)
+    changed = next((pair for pair in pairs if pair[0] != pair[1]), (both[0], both[1]))
     path.write_text(fault.source)
     os.utime(path, (0, time.time() + 10))  # compiled files are told apart by seconds
     try:
-        yield function, next(c for c in functions(new) if names(c) == names(function))
+        yield changed
     finally:
         path.write_bytes(before)
         os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))

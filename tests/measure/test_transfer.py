@@ -166,6 +166,7 @@ def test_verdicts() -> None:
     assert found.tau(1, 0) is found.pairs[0, 1].tau
     assert compared(outcomes(SPREAD, SPREAD, seeds=20)).verdict(0, 1) == "open"
     assert compared(outcomes(steps, steps, seeds=300)).verdict(0, 1) == "alike"  # no seed alike
+    assert compared(outcomes(SPREAD, SPREAD, seeds=300)).verdict(0, 1) == "alike"  # within ceilings
 
 
 def tried(simulator: str, policy: str, seed: int, success: bool | None, **more: Any) -> Record:

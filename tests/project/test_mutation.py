@@ -12,7 +12,7 @@ from tests.mutation import Asking, Fault, planted
 
 SOURCE = """\
 class A:
-    def one(self):
+    def one(self, of=lambda: 2):
         def inner(): ...
         return 1
 

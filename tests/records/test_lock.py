@@ -44,6 +44,7 @@ time.sleep(600)
 
 def test_the_processes_of_one_run_share_it(tmp_path: Path) -> None:
     workers = [FolderLock(tmp_path, shared=True) for _ in range(2)]
+    workers.pop(0).close()
     with pytest.raises(FolderError, match="another run is under way"):
         FolderLock(tmp_path)  # somebody resumes it meanwhile
     for worker in workers:
