@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from textwrap import dedent
 
@@ -10,6 +11,7 @@ import pytest
 
 from pytest_simbench.cli.asked import asked
 from pytest_simbench.cli.values import BadInput
+from pytest_simbench.experiment.case import PROTOCOLS, Case
 from tests.approval import assert_approved_line
 
 TESTS = """
@@ -81,6 +83,22 @@ def test_the_task_the_case_and_the_claims(capfd: pytest.CaptureFixture[str]) -> 
     assert not found.failed
     assert capfd.readouterr() == ("", "")
     assert not Path(".simbench").exists()
+
+
+def test_the_whole_case() -> None:
+    options = """--sim-name=mujoco --sim-profile=real --sim-seed=7 --sim-jitter=0.5 --sim-fresh
+        --sim-protocol=smoke --sim-stall-timeout=50 --sim-memory-limit=900 --sim-trace=on
+        --sim-set=mujoco.cone=pyramidal --sim-timeout=8"""
+    case = asked("test_mine.py::test_ids[b]", options.split()).experiment.case
+    test = "test_mine.py::test_ids"
+    assert replace(case, folder=Path()) == Case.of(
+        "mujoco", profile="real", changes={"cone": "pyramidal"}, test=f"{test}[mujoco-headless-b]",
+        function=test, variant="b", mode="headless", folder=Path(), protocol=PROTOCOLS["smoke"],
+        timeout=8, stall_timeout=50.0, memory_limit=900.0, seed=7, jitter=0.5, trace="on",
+        fresh=True,
+    )  # fmt: skip
+    case = asked("test_mine.py::test_ids[b]", [*OPTIONS, "--sim-record=mcap"]).experiment.case
+    assert (case.trace, case.video, case.fresh, case.needs) == ("on", "off", False, ())
 
 
 @pytest.mark.parametrize("ids", ["b", "mujoco-headless-b"])

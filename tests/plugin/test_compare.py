@@ -218,3 +218,4 @@ def test_a_saved_run_is_named_by_its_time_and_its_commit() -> None:
     for commit, told in (("unversioned", ""), ("89abcdef0123", ", commit 89abcdef01"), (None, "")):
         found = _name({**saved, "commit_info": {"id": commit}})
         assert found == f"the run saved 2026-11-01 10:00:09 UTC{told}"
+    assert _name({}) == "the run saved  UTC"
