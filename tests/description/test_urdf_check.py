@@ -217,6 +217,7 @@ INERTIA = 'ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"'
         (LIMIT, LIMIT.replace('velocity="1"', 'velocity="-1"'), "has the velocity limit '-1'"),
         (LIMIT, LIMIT.replace('velocity="1"', ""), "has <limit velocity=''>; give a number"),
         (AXIS, AXIS + '<mimic joint="slide"/>', ""),
+        (AXIS, AXIS + "<mimic/>", "follows '', which is no moving joint"),
         (AXIS, AXIS + '<mimic joint="end"/>', "follows 'end', which is no moving joint"),
         (AXIS, AXIS + '<mimic joint="shoulder"/>', "follows itself (<mimic>)"),
         (AXIS, AXIS + '<mimic joint="slide" multiplier="x"/>', "has <mimic multiplier='x'>"),
