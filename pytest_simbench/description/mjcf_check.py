@@ -59,7 +59,7 @@ def check_mjcf(path: str, room: Path | None = None, above: tuple[Path, ...] = ()
         folder = folders.get(FOLDERS.get(element.tag, ""), "")
         for key in FILES:
             if element.tag in FOLDERS and element.get(key):
-                name = str(Path(folder) / element.get(key, ""))
+                name = str(Path(folder) / element.attrib[key])
                 other = _inside(name, root, room, lines[element])
                 if element.tag == "model" and other not in (*above, main.resolve()):
                     check_mjcf(str(other), room, (*above, main.resolve()))

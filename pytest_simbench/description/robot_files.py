@@ -87,7 +87,7 @@ def _collision_xml(checked: Description, name: str, name_of: Callable[[Path], st
         for visual in element.findall("visual"):
             element.remove(visual)
         for mesh in element.iterfind("collision/geometry/mesh"):
-            mesh.set("filename", name_of(Path(checked.meshes[mesh.get("filename", "")])))
+            mesh.set("filename", name_of(Path(checked.meshes[mesh.attrib["filename"]])))
         root.append(element)
     return root
 

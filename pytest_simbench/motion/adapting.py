@@ -11,7 +11,6 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 from pytest_simbench.description.links import joint_motion
 from pytest_simbench.description.robot_files import content_of, keep
@@ -74,10 +73,10 @@ def lock_joints(robot: ET.Element, positions: Mapping[str, float]) -> None:
     for joint in robot.findall("joint"):
         if joint.get("name") not in positions or joint.get("type") not in MOVING:
             continue
-        axis, position = _numbers(joint, "axis", "xyz", "1 0 0"), positions[joint.get("name", "")]
+        axis, position = _numbers(joint, "axis", "xyz", "1 0 0"), positions[joint.attrib["name"]]
         _check_within(joint, position)
         origin = pose_of_rpy(*(_numbers(joint, "origin", key, "0 0 0") for key in ("xyz", "rpy")))
-        moved = joint_motion(joint.get("type", ""), axis, position)
+        moved = joint_motion(joint.attrib["type"], axis, position)
         for tag in ("origin", "mimic"):
             for element in joint.findall(tag):
                 joint.remove(element)
@@ -134,7 +133,7 @@ def with_tool(
     """
     kept, link = content_of(robot), robot.tool_frame
     urdf = ET.fromstring(kept["urdf"])
-    names = [element.get("name", "") for element in urdf.findall("link")]
+    names = [element.attrib["name"] for element in urdf.findall("link")]
     if link not in names:
         raise DescriptionError(
             f"the tool frame {link!r} is no link; choose from {', '.join(names)}"
@@ -169,7 +168,7 @@ def mounted(
     """
     kept, added = content_of(robot), content_of(other)
     arm, hand = (ET.fromstring(content["urdf"]) for content in (kept, added))
-    names = [link.get("name", "") for link in arm.findall("link")]
+    names = [link.attrib["name"] for link in arm.findall("link")]
     if mount not in names:
         raise DescriptionError(
             f"the hand is mounted on {mount!r}, which is no link of the arm; choose from "
@@ -199,14 +198,13 @@ def _below(xml: ET.Element, root: str) -> set[str]:
         found.add(name)
         for joint in xml.findall("joint"):
             if _end(joint, "parent") == name:
-                found.add(joint.get("name", ""))
+                found.add(joint.attrib["name"])
                 waiting.append(_end(joint, "child"))
     return found
 
 
 def _end(joint: ET.Element, tag: str) -> str:
-    element = joint.find(tag)
-    return "" if element is None else element.get("link", "")
+    return next(joint.iter(tag)).attrib["link"]
 
 
 def pairs_not_checked(urdf: ET.Element, lists: Iterable[ET.Element]) -> ET.Element:
@@ -215,7 +213,7 @@ def pairs_not_checked(urdf: ET.Element, lists: Iterable[ET.Element]) -> ET.Eleme
 
     Links that are fixed to each other move as one, so the neighbours of one are those of all.
     """
-    links = {link.get("name", "") for link in urdf.findall("link")}
+    links = {link.attrib["name"] for link in urdf.findall("link")}
     found = {
         (pair.get("link1", ""), pair.get("link2", ""))
         for xml in lists
@@ -236,7 +234,7 @@ def pairs_not_checked(urdf: ET.Element, lists: Iterable[ET.Element]) -> ET.Eleme
 
 def _rigid_bodies(urdf: ET.Element) -> Mapping[str, set[str]]:
     """Each link's body: the links that fixed joints hold together with it."""
-    body: dict[str, Any] = {link.get("name", ""): {link.get("name")} for link in urdf.iter("link")}
+    body = {link.attrib["name"]: {link.attrib["name"]} for link in urdf.findall("link")}
     for joint in urdf.findall("joint"):
         if joint.get("type") == "fixed":
             whole = body[_end(joint, "parent")] | body[_end(joint, "child")]

@@ -98,8 +98,7 @@ class _Reader:
         self._locked, self._changed = table.every("locked", FileTable.number), False
         description = Description(self.urdf, self.packages, self._adapt)
         self.moving = _moving(description.joints)
-        moving = [j for j in description.joints if j.get("name", "") in self.moving]
-        self._mimics = {j.get("name", ""): mimic for j in moving for mimic in j.iter("mimic")}
+        self._mimics = {n: mimic for n, j in self.moving.items() for mimic in j.iter("mimic")}
         corners = table.number("hull_corners", 0.0, least=0.0)
         if corners and (corners < FEWEST_CORNERS or corners != int(corners)):
             raise table.error("hull_corners", f"give a whole number of at least {FEWEST_CORNERS}")
@@ -185,15 +184,13 @@ class _Reader:
         columns = [table.each(key, n, least=SMALLEST) for key in ("stiffness", "damping")]
         effort = table.each("effort", n, self._of_urdf("effort", names), least=SMALLEST)
         armature = table.each("armature", n, panda.ARMATURE, least=0.0)
-        return tuple(
-            Joint(*values) for values in zip(names, *columns, effort, armature, start, strict=True)
-        )
+        return tuple(map(Joint, names, *columns, effort, armature, start))
 
     def _check_mimics(self, fingers: Collection[str]) -> None:
         """Fingers alone follow each other, and move alike."""
         for name, mimic in self._mimics.items():
-            leader, told = mimic.get("joint", ""), (mimic.get("multiplier"), mimic.get("offset"))
-            alike = tuple(map(float, (told[0] or 1, told[1] or 0))) == (1.0, 0.0)
+            leader, ratio = mimic.attrib["joint"], float(mimic.get("multiplier", 1))
+            alike = (ratio, float(mimic.get("offset", 0))) == (1.0, 0.0)
             if not (alike and {name, leader} <= set(fingers)):
                 raise DescriptionError(
                     f"joint {name!r} follows {leader!r} (<mimic>), and here each joint of an arm "
@@ -203,8 +200,8 @@ class _Reader:
 
     def _of_urdf(self, key: str, names: Sequence[str]) -> list[float]:
         """The URDF's limits of effort or velocity."""
-        limits = [self.moving.get(name) for name in names]
-        return [0.0 if limit is None else float(limit.get(key, "0")) for limit in limits]
+        limits = [next(self.moving[name].iter("limit")) for name in names]
+        return [float(limit.get(key, 0)) for limit in limits]
 
     def _limits(self, arm: FileTable, names: Sequence[str]) -> MotionLimits:
         n = len(names)
@@ -263,13 +260,9 @@ def _pose(table: FileTable) -> Pose | None:
     return pose_of_rpy(table.each("xyz", 3, 0.0), table.each("rpy", 3, 0.0))
 
 
-def _moving(joints: Iterable[ET.Element]) -> dict[str, ET.Element | None]:
-    """The limits of the joints that move, by name."""
-    return {
-        joint.get("name", ""): joint.find("limit")
-        for joint in joints
-        if joint.get("type") in MOVING
-    }
+def _moving(joints: Iterable[ET.Element]) -> dict[str, ET.Element]:
+    """The joints that move, by name."""
+    return {joint.get("name", ""): joint for joint in joints if joint.get("type") in MOVING}
 
 
 def _check_moving(

@@ -90,7 +90,7 @@ def width_of_jaw(robot: Robot) -> float:
     """Of the cubes that a robot of `grasping` was made for [m]."""
     origin = ET.fromstring(content_of(robot)["urdf"]).find(f"joint[@name='{GRASP_JOINT}']/origin")
     assert origin is not None  # `with_tool` wrote it
-    return 2 * float(origin.get("xyz", "").split()[1])
+    return 2 * float(origin.attrib["xyz"].split()[1])
 
 
 @robot_cache

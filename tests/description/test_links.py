@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 from pytest_simbench.description.links import (
+    borne,
     check_apart,
     check_robot,
     ends,
@@ -65,6 +66,14 @@ def test_axes_are_pinocchios() -> None:
         np.testing.assert_allclose(
             motion_subspace(joint), np.concatenate([column[3:], column[:3]]), atol=1e-12
         )
+
+
+def test_what_a_link_does_not_feel_of_gravity_bears_it() -> None:
+    prepared = PreparedRobot(ROBOT.with_joints("panda_joint3", gravity=0.25))
+    weight = prepared.links["panda_link3"].mass * np.array([0.0, 1.0, -10.0])
+    for felt, share in (({}, -0.75), ({"felt": 0.0}, 0.25)):
+        (told,) = borne(prepared, (0.0, 1.0, -10.0), **felt).items()
+        assert told == ("panda_link3", pytest.approx(share * weight))
 
 
 def four_bar() -> Robot:

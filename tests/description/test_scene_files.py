@@ -107,9 +107,13 @@ def test_what_is_included_in_a_replicate_counts_as_often(
         )
         with pytest.raises(DescriptionError, match="more than 3") if refused else nullcontext():
             check_mjcf(str(tmp_path / "a.xml"))
-    monkeypatch.setitem(mjcf_check.MOST, "geom", 0)
+    monkeypatch.setitem(mjcf_check.MOST, "geom", 0)  # of elements five times as many
     with pytest.raises(DescriptionError, match="a.xml, line 1: too much is included"):
         check_mjcf(str(tmp_path / "a.xml"))
+    monkeypatch.setitem(mjcf_check.MOST, "geom", 1)
+    five = "<mujoco><option/><size/><frame/><include file='b.xml'/></mujoco>"
+    (tmp_path / "a.xml").write_text(five)
+    check_mjcf(str(tmp_path / "a.xml"))
 
 
 def test_a_link_out_of_the_folder_is_refused(tmp_path: Path) -> None:

@@ -60,7 +60,9 @@ def test_dynamics_are_those_of_the_original(base: Pose, tmp_path: Path) -> None:
 
 
 def test_lines_are_short_enough_for_bullet() -> None:
-    assert max(map(len, PreparedRobot(panda()).to_urdf().splitlines())) < 1000
+    text = PreparedRobot(panda()).to_urdf()
+    assert max(map(len, text.splitlines())) < 1000
+    assert [text.count(f"<{tag}>") for tag in ("visual", "collision", "mimic")] == [17, 17, 0]
 
 
 def test_other_fingers_follow_and_nothing_is_drawn_where_asked() -> None:
@@ -76,7 +78,8 @@ def test_a_body_is_one_link(tmp_path: Path) -> None:
     corners, _ = principal([(0, 0, 0), (0.06, 0, 0), (0, 0.06, 0), (0, 0, 0.06)])
     parts = (Cylinder("rod", 0.01, 0.06, Pose.at(0, 0, 0.1)), ConvexMesh("rock", corners, Pose()))
     body = Compound("pair", parts, Pose.at(1, 2, 3), 0.5, moments=(0.1, 0.2, 0.25))
-    (link,) = ET.fromstring(body_urdf(body, lambda name, hull: tmp_path / name))
+    (link,) = root = ET.fromstring(body_urdf(body, lambda name, hull: tmp_path / name))
+    assert (root.attrib, link.attrib) == ({"name": "body"}, {"name": "body"})
     assert [link.find("inertial/mass").get("value"), link.find("inertial/inertia").get("izz")] == [
         "0.5", "0.25",
     ]  # fmt: skip

@@ -105,11 +105,12 @@ def test_of_everything_it_is_told_what_became_of_it(tmp_path: Path) -> None:
     follow = ("<dynamics", '<mimic joint="hinge" offset="1"/><dynamics')
     plain = ('<sphere radius=".05"/>', '<box size=".1 .1 .1"/>')
     coupled = ("<dynamics", '<mimic joint="hinge" multiplier=".2"/><dynamics')
+    heavy = ('<mass value="2"/>', '<mass value="2"><unit name="kilogram"/></mass>')
     away = ('"continuous">', '"revolute"><calibration/><limit lower=".5" upper="1"/>')
     for name, changes in (
         ("cabinet", [knob]),
         ("cabinet-follows", [follow, plain]),
-        ("cabinet-coupled", [coupled, away, ('robot name="cabinet"', "robot")]),
+        ("cabinet-coupled", [coupled, away, heavy, ('robot name="cabinet"', "robot")]),
     ):
         account = read(tmp_path, *changes).account
         assert_approved(name, "\n".join(" | ".join(line.to_wire().values()) for line in account))
@@ -180,7 +181,11 @@ def test_packages_are_folders_above_the_file_or_beside_one(tmp_path: Path) -> No
         ('<sphere radius=".05"/>', '<sphere radius="51"/>', "a sphere whose size is not .* 50 m"),
         ('<sphere radius=".05"/>', "<capsule/>", "must be one box, sphere, cylinder or mesh"),
         ('length=".2"', 'length="0"', "link 'drawer' has a cylinder whose size"),
+        ('length=".2"', 'length="x"', "link 'drawer' has <cylinder length='x'>"),
         ('friction=".5"', 'friction="-1"', "joint 'rail' has a damping or friction"),
+        ('friction=".5"', 'friction="x"', "joint 'rail' has <dynamics friction='x'>"),
+        ('damping="4"', 'damping="x"', "joint 'rail' has <dynamics damping='x'>"),
+        ("<dynamics ", "<dynamics/><dynamics ", "joint 'rail' has 2 <dynamics>; leave one"),
         ('name="hinge" type="continuous"', 'name="hinge" type="floating"', "'hinge' is floating"),
         ('<mass value="1"/>', '<mass value="0"/>', "has moments of inertia and no mass"),
         ('child link="door"', 'child link="gate"', "joint 'hinge' has the child 'gate'"),

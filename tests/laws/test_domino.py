@@ -114,6 +114,16 @@ def test_the_laws_times_are_those_of_plates_that_push_each_other(row: Row) -> No
     assert row.drift < 1e-6
 
 
+def test_the_weight_of_an_upright_plate_lies_half_as_high_as_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name, value in (("HEIGHT", 0.5), ("MASS", 3.0), ("INERTIA", 0.7)):
+        monkeypatch.setattr(domino, name, value)
+    assert domino.potential(0.0, 1) == pytest.approx(3.0 * GRAVITY * 0.25)
+    assert domino.potential(math.pi / 3, 1) == pytest.approx(3.0 * GRAVITY * 0.125)
+    assert domino.inertia(0.3, 1) == pytest.approx(0.7)
+
+
 def test_plates_that_fell_stay_together(row: Row) -> None:
     """No plate pulls another one, neither between impacts nor in one: least force 0.118 m g."""
     assert row.least_force > 0.1 * MASS * GRAVITY

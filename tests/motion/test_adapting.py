@@ -65,6 +65,24 @@ def test_a_link_that_only_marks_a_frame_has_no_mass(tmp_path: Path) -> None:
     shape = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
     with pytest.raises(RobotError, match="'grip' has the principal moments 0, 0, 0"):
         read_robot(small_arm(tmp_path, TOML, urdf.replace(nothing, nothing + shape)))
+    with pytest.raises(RobotError, match="'grip' has <mass value=''>; give a number"):
+        read_robot(small_arm(tmp_path, TOML, urdf.replace(' value="1e-9"', "")))
+
+
+def test_a_locked_joint_may_lack_what_the_urdf_has_a_default_for(tmp_path: Path) -> None:
+    """Limits and axis; what is there must be numbers."""
+    joint = URDF[URDF.index('<joint name="left_finger"') : URDF.index('<link name="right"')]
+    bare = joint.replace(joint[joint.index("<axis") : joint.index("</joint>")], "")
+    model = RobotModel(read_robot(small_arm(tmp_path, still(0.3, 0.0), URDF.replace(joint, bare))))
+    places = [model.pin.frames[model.pin.getFrameId(name)].placement for name in ("left", "right")]
+    assert (places[0].translation - places[1].translation).tolist() == pytest.approx([0.3, 0, 0])
+    for old, told in (
+        ('lower="0.0" ', r"'left_finger' has the limits \('', '0.05'\); give 2 numbers"),
+        ('axis xyz="0', "'left_finger' has <axis xyz='x 1 0'>; give 3 numbers"),
+    ):
+        urdf = URDF.replace(joint, joint.replace(old, 'axis xyz="x' if "axis" in old else ""))
+        with pytest.raises(RobotError, match=told):
+            read_robot(small_arm(tmp_path, still(0.0, 0.0), urdf))
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=8)

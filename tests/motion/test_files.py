@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -57,10 +58,11 @@ def test_what_a_file_says_besides(tmp_path: Path) -> None:
     more = TOML.replace(
         "[arm]",
         "yaw = 1.5\nfriction = 0.6\nself_collide = true\n[arm]\njerk = 50\nlevers = [1, 0.9, 0.5]",
-    )
+    ).replace("base =", "stand = [0.3, 0.1, 0.0]\nbase =")
     more = more.replace("[arm]\n", "[arm]\nvelocity = [1, 1.5, 2]\neffort = 40\narmature = 0.02\n")
     robot = read_robot(small_arm(tmp_path, more.replace("[hand]", "[hand]\nspeed = 0.1")))
     assert robot.base == Pose.at(0.1, 0.0, 0.2, yaw=1.5)
+    assert robot.stand == Pose.at(0.3, 0.1, 0.0, yaw=1.5)
     assert robot.friction == 0.6
     assert robot.self_collide
     assert robot.column("effort_limit")[:3].tolist() == [40, 40, 40]
@@ -195,9 +197,17 @@ HULLS = "hull_corners = 99"
 
 
 def test_a_package_also_holds_the_link_pairs_of_an_arm_with_hulls(tmp_path: Path) -> None:
-    (tmp_path / "small.srdf").write_text('<robot name="small"/>')
+    pairs = '<disable_collisions link2="upper" link1="foot"/><disable_collisions link2="foot"/>'
+    (tmp_path / "small.srdf").write_text(f"<robot>{pairs}</robot>")
     toml = TOML.replace("[arm]", 'srdf = "package://mine/small.srdf"\npackages.mine = "."\n[arm]')
-    assert read_robot(small_arm(tmp_path, f"{HULLS}\n{toml}")).srdf
+    srdf = Path(read_robot(small_arm(tmp_path, f"{HULLS}\n{toml}")).srdf).read_text()
+    told = re.findall('link1="(.*?)" link2="(.*?)"', srdf)
+    assert ("foot", "upper") in told  # and what one joint joins, the grip fixed to the last link
+    assert set(told) - {("foot", "upper")} == {
+        ("column", "foot"), ("column", "upper"), ("lower", "upper"), ("grip", "upper"),
+        ("left", "lower"), ("grip", "left"), ("lower", "right"), ("grip", "right"),
+        ("grip", "lower"),
+    }  # fmt: skip
 
 
 SWING = "[throw]\nstart = [0.1, 0.2, 0.3]\nend = "

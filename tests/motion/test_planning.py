@@ -90,6 +90,10 @@ def test_fingers_open_at_the_release(planner: MotionPlanner) -> None:
         assert (fingers[: throw.row] == 0.0).all()
         assert (fingers[throw.row :] == 0.035).all()
         half = 10.0 ** -DECIMALS[0] / 2  # of the last decimal
+        told = trajectory.position, trajectory.velocity, trajectory.effort
+        for rows, decimals in zip(told, DECIMALS, strict=True):
+            assert np.array_equal(rows, rows.round(decimals))
+            assert not np.signbit(rows[rows == 0.0]).any()
         assert np.allclose(trajectory.position[:, :7], throw.timed.position, 0.0, 1.01 * half)
 
 

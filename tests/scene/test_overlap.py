@@ -148,6 +148,7 @@ def test_a_box_has_its_faces_volume_and_inertia() -> None:
     assert sorted(map(len, found.faces)) == [4] * 6
     assert len(found.triangles) == 12
     assert len(found.edges) == 3
+    assert found.size == pytest.approx(SIZE.max())
     assert found.volume == pytest.approx(np.prod(SIZE))
     assert np.allclose(found.centroid, [1.0, 2.0, 3.0])
     squares = SIZE**2

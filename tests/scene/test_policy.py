@@ -95,6 +95,10 @@ def test_a_velocity_moves_the_set_point_on() -> None:
     for _ in range(3):
         at.after(Command(velocity=np.full(7, 0.2)))
     np.testing.assert_allclose(at.position[:7] - START[:7], 0.06)
+    whole = SetPoints(panda(), np.zeros(9, int), np.zeros(9, int), 0.1)
+    whole.after(Command(velocity=np.full(7, 0.2)))
+    assert whole.position.tolist() == pytest.approx([0.02] * 7 + [0.0] * 2)
+    assert whole.effort.dtype == float
 
 
 def test_the_arm_is_held_against_gravity() -> None:

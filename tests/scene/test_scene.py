@@ -30,6 +30,11 @@ def test_overlapping_bodies_are_an_error_that_names_both() -> None:
     with pytest.raises(SceneError, match="'a' and 'b' overlap by 10.0 mm"):
         Scene("s", (box("a", 0.0), box("b", 0.04)))
     Scene("s", (box("a", 0.0), box("b", 0.05)))  # they touch
+    large = [Box(name, (2.0, 2.0, 2.0), Pose.at(x, 0, 1), 1.0) for name, x in (("a", 0), ("b", 2))]
+    with pytest.raises(SceneError, match="'a' and 'b' overlap by 1900.0 mm"):
+        Scene("s", (large[0], large[1].moved_to(Pose.at(0.1, 0, 1))))
+    rows = np.array([[x, 0.0, 1.0, 1.0, *[0.0] * 9] for x in (0.0, 0.1)])
+    assert implausible(Scene("s", tuple(large)), rows) == "'a' and 'b' overlap by 1900 mm"
 
 
 def test_a_scene_travels_unchanged() -> None:
@@ -50,10 +55,10 @@ def test_pairs_kept_apart_may_be_inside_each_other() -> None:
     assert not scene.kept_apart("body/b", "ground")
     assert Scene.from_wire(json.loads(json.dumps(scene.to_wire()))) == scene
     rows = np.array([[*body.pose.as_array(), *[0.0] * 6] for body in bodies])
-    sunk = rows - [0, 0, 0.1, *[0.0] * 10]
+    sunk = rows - [0, 0, 2.0, *[0.0] * 10]
     assert implausible(scene, rows) is None
     assert implausible(scene, np.array([sunk[0], rows[1]])) is None
-    assert "'b' is 100 mm deep in the ground" in str(implausible(scene, sunk))
+    assert "'b' is 2000 mm deep in the ground" in str(implausible(scene, sunk))
 
 
 @pytest.mark.parametrize("name", ["body/c", "box", "link/hand"])
@@ -71,6 +76,9 @@ def test_a_start_moves_bodies_and_joints() -> None:
     assert started.body("a") == scene.body("a")
     assert [joint.initial_position for joint in started.robot.joints] == list(positions)
     assert scene.at_start(Start((), ())) == scene
+    for wrong in (Start(("a", "b"), (Pose(),)), Start((), (), positions[1:])):
+        with pytest.raises(ValueError, match=r"zip\(\) argument 2 is shorter than argument 1"):
+            scene.at_start(wrong)
 
 
 def test_a_ground_that_bounces_crosses_and_another_is_not_named() -> None:
@@ -205,6 +213,13 @@ def test_one_set_point_is_held_at_rest() -> None:
     assert held.velocity.tolist() == [[0.0, 0.0]] * 2
     assert held.effort.tolist() == [effort.tolist()] * 2
     assert Trajectory.holding(0.004, goal).effort.tolist() == [[0.0, 0.0]] * 2
+
+
+def test_whole_numbers_are_numbers() -> None:
+    held = Trajectory(0.1, [[1], [2]], [[0], [0]], [[3], [4]])
+    column = panda().with_joints(*panda().joint_names, armature=1).column("armature")
+    for rows in (held.position, held.velocity, held.effort, column):
+        assert rows.dtype == float
 
 
 @given(st.integers(2, 50), TIMESTEPS)

@@ -32,7 +32,7 @@ REACH = 0.03
 """A cube whose centre is nearer than this to the tool centre point is between the fingers [m]."""
 
 HALF = CUBE_SIZE / 2
-"""Where a finger stands that presses on a cube [m]."""
+"""Where a finger stands that presses on a cube of the study [m]."""
 
 Effect = Callable[["ScriptedProcess"], None]
 Cube = Callable[["ScriptedProcess"], str]
@@ -64,8 +64,10 @@ class ScriptedProcess:
 
     Args:
         script: mishaps; `pending` are those that have not happened yet.
+        scale: of the scene's lengths over those of the study's.
 
     Attributes:
+        half: where a finger stands that presses on a cube of the scene [m].
         asked: every operation so far.
         counts, marks: what the task reported as progress, the moments that it marked [s].
         released: cubes that the hand let go, in order, and the pose that each had then.
@@ -80,12 +82,15 @@ class ScriptedProcess:
     busy = False
     alive = True
 
-    def __init__(self, script: Iterable[Mishap] = (), *, timestep: float = 0.004) -> None:
+    def __init__(
+        self, script: Iterable[Mishap] = (), *, timestep: float = 0.004, scale: float = 1.0
+    ) -> None:
         self.where = Where("scripted", "headless")
         self.launch = SimpleNamespace(compile_timeout=0.0, log=None)
         self.deadline: float | None = None
         self.pending = list(script)
         self.timestep = timestep
+        self.half = HALF * scale
         self.asked: list[Asked] = []
         self.released: list[tuple[str, Pose]] = []
         self.time = 0.0
@@ -159,7 +164,7 @@ class ScriptedProcess:
         self._samples = []
         instants: set[float] = {0.0, duration}
         if rows.size:  # where the fingers pass the cube's width
-            pressing = rows[:, -1] < HALF - 1e-4
+            pressing = rows[:, -1] < self.half - 1e-4
             instants |= {float(times[k]) for k in np.flatnonzero(np.diff(pressing)) + 1}
         due: list[tuple[float, Mishap]] = []
         for mishap in self.pending:
@@ -205,7 +210,7 @@ class ScriptedProcess:
     def _command(self, position: FloatArray) -> None:
         """The joints are there at once, and the cube in the hand with them."""
         self.position = self.commanded = position
-        pressing = position[-1] < HALF - 1e-4
+        pressing = position[-1] < self.half - 1e-4
         if pressing and self.held is None:
             self._grasp()
         elif self.held is not None:
@@ -213,7 +218,7 @@ class ScriptedProcess:
             if not pressing:
                 self.let_go()
         if self.held is not None:
-            self.position = np.concatenate([position[:-2], [HALF, HALF]])
+            self.position = np.concatenate([position[:-2], [self.half, self.half]])
 
     def _grasp(self) -> None:
         tool = self.tool()
@@ -240,9 +245,9 @@ class ScriptedProcess:
                 half = np.array(self.scene.body(other).size) / 2
                 apart = np.abs(np.subtract(place.position, pose.position))
                 top = place.position[2] + half[2]
-                if apart[0] < half[0] + HALF and apart[1] < half[1] + HALF and top <= z:
+                if apart[0] < half[0] + self.half and apart[1] < half[1] + self.half and top <= z:
                     tops.append(top)
-        return Pose.at(x, y, max(tops) + HALF, yaw=pose.yaw)
+        return Pose.at(x, y, max(tops) + self.half, yaw=pose.yaw)
 
     def _joints(self) -> FloatArray:
         return np.array([self.position, np.zeros_like(self.position)])

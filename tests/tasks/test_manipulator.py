@@ -219,6 +219,8 @@ def test_what_cannot_be_grasped_says_why() -> None:
     far.put(CUBE, Pose.at(-2.0, 0.0, 0.025))
     with pytest.raises(PlanningError, match=r"unreachable: tool at \(-2\.000"):
         far.manipulator.pick(CUBE)
+    with pytest.raises(PlanningError, match="unreachable: straight line to"):
+        far.manipulator.pick("cube_12", way=(1.0, 0.0, 0.0))
     assert far.manipulator.recover() is None
     assert all(asked.kind == "wait" for asked in far.process.asked)  # nothing was moved
 

@@ -15,7 +15,17 @@ from pytest_simbench.records.notes import Wait
 from pytest_simbench.scene import Pose
 from pytest_simbench.tasks import Jitter, Stacking
 from pytest_simbench.tasks.stacking import Place, _placed, _strict
-from tests.tasks.scripted import Mishap, drop, fail, move, perform, put, stacked, untouched
+from tests.tasks.scripted import (
+    Mishap,
+    ScriptedProcess,
+    drop,
+    fail,
+    move,
+    perform,
+    put,
+    stacked,
+    untouched,
+)
 
 ONE = Stacking(towers=1, levels=1)
 ONE_IN_FULL = replace(ONE, full_wait=True)
@@ -26,21 +36,30 @@ SCORES = (
 PLACE, AXES = Place(0, 1, Pose()), np.eye(3)
 
 
+def sized(task: Stacking, scale: float) -> Stacking:
+    """The task in a scene of another size, which a smaller arm would have."""
+    vars(task)["scale"] = scale
+    return task
+
+
 def score(task: Stacking, *script: Mishap, **options: Any) -> dict[str, float | None]:
     return perform(task, *script, **options)[0].metrics
 
 
-def test_every_score_of_a_world_with_one_of_everything() -> None:
-    """No two scores are the same, so none can stand for another."""
+@pytest.mark.parametrize("scale", [1.0, 0.9])
+def test_every_score_of_a_world_with_one_of_everything(scale: float) -> None:
+    """No two scores are the same, so none can stand for another. So it is in a smaller scene."""
+    s = scale
     outcome, process = perform(
-        Stacking(towers=2, levels=3, full_wait=True),
+        sized(Stacking(towers=2, levels=3, full_wait=True), s),
         Mishap("pick cube 2 of 6", 2.6, drop),  # lost while it is lifted
-        Mishap("check cube 4 of 6", 0.05, move(stacked(5), x=0.012)),  # in its place, not strictly
-        Mishap("check cube 6 of 6", 0.05, move(stacked(7), y=0.06, z=-0.1)),  # fallen at once
-        Mishap("settle", 30.0, move(stacked(6), x=0.1, z=-0.025, tilt=0.05)),  # fallen later
-        Mishap("settle", 59.9, move(untouched(1), x=-0.008, y=-0.008)),  # knocked by 11 mm
-        Mishap("settle", 59.9, move(untouched(2), x=-0.009)),
-        Mishap("settle", 59.9, move(untouched(3), z=0.0105)),
+        Mishap("check cube 4 of 6", 0.05, move(stacked(5), x=0.012 * s)),  # in place, not strictly
+        Mishap("check cube 6 of 6", 0.05, move(stacked(7), y=0.06 * s, z=-0.1 * s)),  # fallen
+        Mishap("settle", 30.0, move(stacked(6), x=0.1 * s, z=-0.025 * s, tilt=0.05)),  # later
+        Mishap("settle", 59.9, move(untouched(1), x=-0.008 * s, y=-0.008 * s)),  # by 11 mm
+        Mishap("settle", 59.9, move(untouched(2), x=-0.009 * s)),
+        Mishap("settle", 59.9, move(untouched(3), z=0.0105 * s)),
+        process=ScriptedProcess(scale=s),
     )
     assert outcome.metrics == {
         "placed": 5 / 6,
@@ -58,17 +77,17 @@ def test_every_score_of_a_world_with_one_of_everything() -> None:
         *((order[0], 0, 0), (order[1], 0, 1), (order[2], 0, 2)),
         *((order[3], 1, 0), (order[4], 1, 1), (order[5], 1, 2)),
     ]
-    assert picks[3]["placed_error"] == pytest.approx([0.012, 0, 0, 0], abs=1e-5)
+    assert picks[3]["placed_error"] == pytest.approx([0.012 * s, 0, 0, 0], abs=1e-5)
     assert picks[3]["end_error"] == picks[3]["placed_error"]
     assert picks[4]["placed_error"] == pytest.approx([0, 0, 0, 0], abs=1e-5)
-    assert picks[4]["end_error"] == pytest.approx([0.1, 0, -0.025, 0.05], abs=1e-5)
-    assert picks[5]["placed_error"] == pytest.approx([0, 0.06, -0.1, 0], abs=1e-5)
+    assert picks[4]["end_error"] == pytest.approx([0.1 * s, 0, -0.025 * s, 0.05], abs=1e-5)
+    assert picks[5]["placed_error"] == pytest.approx([0, 0.06 * s, -0.1 * s, 0], abs=1e-5)
     assert outcome.details["failed_picks"] == [
         {"cube": lost, "tower": 0, "level": 1, "reason": f"{lost} is not in the hand"}
     ]
     knocked, lifted = untouched(1)(process), untouched(3)(process)
     assert outcome.details["untouched_moved"] == pytest.approx(
-        {knocked: 0.008 * math.sqrt(2), lifted: 0.0105}
+        {knocked: 0.008 * s * math.sqrt(2), lifted: 0.0105 * s}
     )
     assert outcome.details["notes"] == []
     assert process.counts == [(number, 6) for number in range(1, 7)]

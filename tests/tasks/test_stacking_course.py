@@ -20,7 +20,7 @@ from pytest_simbench.tasks.manipulator import Manipulator
 from pytest_simbench.tasks.stacking import Place
 from tests.motion.small_arm import TOML, URDF, small_arm
 from tests.tasks.scripted import Asked, Mishap, ScriptedProcess, drop, perform
-from tests.tasks.test_stacking import ONE, ONE_IN_FULL, SCORES
+from tests.tasks.test_stacking import ONE, ONE_IN_FULL, SCORES, sized
 
 FIRST_OF_2022 = ["cube_02", "cube_06", "cube_09"]
 
@@ -65,6 +65,8 @@ def test_what_a_robot_cannot_do_is_a_sentence(tmp_path: Path) -> None:
         "robot 'ur5' opens its fingers to 0.028 m from the middle and needs 0.03 m for a cube of "
         "0.05 m"
     )
+    small = sized(Stacking(robot=replace(ur5, gripper=replace(ur5.gripper, opened=0.014))), 0.5)
+    assert str(small.problem()).endswith("and needs 0.015 m for a cube of 0.025 m")
     toml = TOML[: TOML.index("[hand]")] + '[hand]\ntool_frame = "grip"\n'
     bare = read_robot(small_arm(tmp_path, toml, URDF.replace('"prismatic"', '"fixed"')))
     assert Stacking(robot=bare).problem() == (
