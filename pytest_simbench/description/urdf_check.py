@@ -92,7 +92,7 @@ class Description:
     def refuse(self, element: ET.Element, why: str, inside: ET.Element | None = None) -> NoReturn:
         """Raise the error about an element, with its line."""
         line = self._lines.get(element if inside is None else inside, 0)
-        name = element.attrib["name"]
+        name = element.get("name", "")
         raise DescriptionError(f"{self.path}, line {line}: {element.tag} {name!r} {why}")
 
     def _named(self, elements: list[ET.Element]) -> dict[str, ET.Element]:

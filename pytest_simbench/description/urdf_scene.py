@@ -196,7 +196,7 @@ class _World(Description):
         tell("contacts between links", NOT_CARRIED, why, whole)
         unread: dict[str, list[str]] = {}
         for where, element in _unread(self.xml):
-            unread.setdefault(element.tag, []).append(where)
+            unread.setdefault(element.tag, []).append(element.get("name") or where)
         for tag, names in unread.items():
             tell(tag, NOT_CARRIED, REASONS.get(tag, "nothing here reads it"), dict.fromkeys(names))
 

@@ -224,11 +224,12 @@ class PlanningScene:
         for arm in path:
             q = np.concatenate([arm, fingers])
             if pin.computeCollisions(model.pin, model.data, geometry, data, q, True):
-                first, second = next(
-                    pair for k, pair in enumerate(self._pairs)
-                    if data.collisionResults[k].isCollision() and data.activeCollisionPairs[k]
-                )  # fmt: skip
-                return geometry.geometryObjects[first].name, geometry.geometryObjects[second].name
+                for index, (first, second) in enumerate(self._pairs):
+                    touching = data.collisionResults[index].isCollision()
+                    if touching and data.activeCollisionPairs[index]:
+                        objects = geometry.geometryObjects
+                        return objects[first].name, objects[second].name
+                return "robot", "obstacle"
         return None
 
 

@@ -155,6 +155,6 @@ def turns(body: Body) -> list[float]:
     eighths = [k * math.pi / 4 for k in range(-4, 4)]
     ways = np.array([(x, y, z) for x in (-3, -1, 2) for y in (-2, 1, 3) for z in (-1, 0, 2)])
     seen = body.reach(ways.astype(float))
-    return [turn for turn in eighths if np.allclose(
-        body.reach(ways @ Pose.at(0, 0, 0, yaw=turn).rotation()), seen, atol=FACE
-    )]  # fmt: skip
+    same = [np.allclose(body.reach(ways @ Pose.at(0, 0, 0, yaw=k).rotation()), seen, atol=FACE)
+            for k in eighths]  # fmt: skip
+    return [turn for turn, alike in zip(eighths, same, strict=True) if alike]

@@ -45,7 +45,7 @@ def with_hulls(
     meshes, those of some links, by name, cut into slices before."""
     urdf, meshes = ET.fromstring(kept["urdf"]), {}
     for link in urdf.iter("link"):
-        cut = (cuts or {}).get(link.attrib["name"])
+        cut = (cuts or {}).get(link.get("name", ""))
         for collision in link.findall("collision"):
             mesh = collision.find("geometry/mesh")
             if mesh is None:
@@ -109,8 +109,8 @@ def stl(points: FloatArray) -> bytes:
 
 def outward_faces(hull: ConvexHull) -> NDArray[np.intp]:
     """Numbers of the points of its triangles, counter-clockwise from outside, (n, 3)."""
-    faces = hull.simplices.astype(int)
+    faces = np.array(hull.simplices, dtype=int)
     a, b, c = hull.points[faces].transpose(1, 0, 2)
-    inwards = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0
+    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     faces[inwards] = faces[inwards][:, ::-1]
     return faces

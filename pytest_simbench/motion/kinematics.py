@@ -48,7 +48,7 @@ def level_turns(body: Pose) -> list[float]:
     """
     axes = body.rotation()
     flat = [axes[:, i] for i in range(3) if abs(axes[2, i]) < np.sqrt(0.5)]
-    yaw = float(np.arctan2(flat[0][1], flat[0][0]))
+    yaw = float(np.arctan2(flat[0][1], flat[0][0])) if flat else 0.0
     return [yaw + quarter * np.pi / 2 for quarter in range(-2, 2)]
 
 
@@ -77,7 +77,7 @@ def inverse_kinematics(
         Unreachable: no start led to the target.
     """
     goal = model.base.actInv(pin.SE3(target.matrix()))
-    starts = [near]
+    starts = [np.asarray(near, dtype=float)]
     if rng is not None:
         starts += list(rng.uniform(model.lower, model.upper, (restarts, model.arm)))
     first: FloatArray | None = None
@@ -166,7 +166,7 @@ def tool_path(model: RobotModel, start: FloatArray, poses: Sequence[Pose]) -> Fl
 def _joint_path(
     model: RobotModel, start: FloatArray, poses: Sequence[pin.SE3], what: str
 ) -> FloatArray:
-    path = [start]
+    path = [np.asarray(start, dtype=float)]
     for pose in poses:
         solution = _descend(model, model.base.actInv(pose), path[-1])
         if solution is None:
@@ -196,8 +196,8 @@ def track(
         held: numbers of joints that were commanded to stay at 0, and are kept near it.
     """
     path = np.empty((len(targets), model.arm))
-    joints, indices = near, list(held)
-    for k, target in enumerate(targets):
+    joints, indices = np.asarray(near, dtype=float), list(held)
+    for row, target in zip(path, targets, strict=True):
         inverse = target.inverse()
 
         def off(
@@ -215,7 +215,7 @@ def track(
             )
 
         joints = least_squares(off, joints, method="lm", xtol=1e-8, ftol=1e-8).x
-        path[k] = joints
+        row[:] = joints
     return path
 
 

@@ -153,12 +153,13 @@ class RobotModel:
             held: a body that the hand carries, its centre at the tool centre point.
         """
         model = self.pin if held is None else self._carrying(held)
-        model.gravity.linear = self.base.rotation.T @ gravity
+        model.gravity.linear = self.base.rotation.T @ np.asarray(gravity, dtype=float)
         data = self.data if held is None else model.createData()
-        rows = np.array([pin.rnea(model, data, *row).copy() for row in np.stack([q, v, a], 1)])
+        rows = np.array([pin.rnea(model, data, *row).copy() for row in zip(q, v, a, strict=True)])
         if self._borne is not None:
             self._borne.gravity.linear = model.gravity.linear
-            rows -= [pin.computeGeneralizedGravity(self._borne, self.data, at).copy() for at in q]
+            for efforts, row in zip(rows, q, strict=True):
+                efforts -= pin.computeGeneralizedGravity(self._borne, self.data, row)
         return rows
 
     def weighing(self, shares: FloatArray) -> pin.Model:

@@ -88,7 +88,7 @@ class MotionPlanner:
         path[[0, -1]] = start, goal
         path = self._shortened(path)
         parts = [straight_move(a, b, self.limits, speed=speed) for a, b in pairwise(path)]
-        whole = Timed(*(np.concatenate([part[k] for part in parts]) for k in range(3)))
+        whole = Timed(*map(np.concatenate, zip(*parts, strict=True)))
         return self.set_points(whole, fingers)
 
     def move_linear(
@@ -189,7 +189,7 @@ class MotionPlanner:
         """Set points of all joints with feed-forward efforts."""
         rows, robot = len(timed.position), self.model.robot
         others = self.model.pin.nq - self.model.arm
-        column = np.broadcast_to(fingers, (rows,))[:, None]
+        column = np.broadcast_to(np.asarray(fingers, dtype=float), (rows,))[:, None]
         position = np.hstack([timed.position, np.repeat(column, others, axis=1)])
         padding = np.zeros((rows, others))
         velocity = np.hstack([timed.velocity, padding])
@@ -199,8 +199,8 @@ class MotionPlanner:
         beside = np.zeros((rows, len(robot.beside)))
         still = beside + robot.column("initial_position")[self.model.pin.nq :]
         parts = ((position, still), (velocity, beside), (effort, beside))
-        told: Iterable[FloatArray] = map(np.round, map(np.hstack, parts), DECIMALS)
-        return Trajectory(TICK, *(table + 0.0 for table in told))
+        told = (np.hstack(p).round(n) + 0.0 for p, n in zip(parts, DECIMALS, strict=True))
+        return Trajectory(TICK, *told)
 
     def _search(self, start: FloatArray, goal: FloatArray, seed: int) -> FloatArray:
         """RRTConnect from start to goal, way points (n, arm)."""
@@ -229,9 +229,8 @@ class MotionPlanner:
         )
         information.setup()
         problem = base.ProblemDefinition(information)
-        states = []
-        for values in (start, goal):
-            states.append(state := information.allocState())
+        states = [information.allocState() for _ in range(2)]
+        for state, values in zip(states, (start, goal), strict=True):
             for i in range(arm):
                 state[i] = float(values[i])
         problem.setStartAndGoalStates(*states)

@@ -55,8 +55,11 @@ def line_move(
     """
     way = np.asarray(goal) - np.asarray(start)
     reach = np.maximum(np.abs(way), 1e-9)
-    bounds = (np.array(_bounds(limits)) / reach).min(axis=1) * shares
-    profile = _plan(np.zeros(1), np.ones(1), *bounds[:, None])
+    bounds = [
+        np.array([(bound / reach).min() * share])
+        for bound, share in zip(_bounds(limits), shares, strict=True)
+    ]
+    profile = _plan(np.zeros(1), np.ones(1), *bounds)
     s, ds, dds = _sampled(profile)
     return Timed(np.asarray(start) + s * way, ds * way, dds * way), float(profile.duration)
 

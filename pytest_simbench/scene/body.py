@@ -157,8 +157,7 @@ class Body(_Placed):
         check_numbers(self.linear_velocity, 3, f"the linear velocity [m/s] of {self.name!r}")
         check_numbers(self.angular_velocity, 3, f"the angular velocity [rad/s] of {self.name!r}")
         check_number(self.restitution, f"the restitution of {self.name!r}", 0.0, 1.0)
-        for kind in ("linear", "angular"):
-            value = getattr(self, f"{kind}_damping")
+        for kind, value in zip(("linear", "angular"), self.damping.tolist(), strict=True):
             check_number(value, f"the {kind} damping [1/s] of {self.name!r}", 0.0)
         if self.fixed and any((*self.linear_velocity, *self.angular_velocity)):
             raise SceneError(

@@ -19,17 +19,17 @@ LEAST = 1e-6
 def _of_means(pairs: FloatArray, asked: FloatArray, count: int) -> FloatArray:
     """Numbers (count,) of which each pair (n, 2) has the mean `asked` (n,), or nearly so."""
     share = np.zeros((len(pairs), count))
-    for k, (first, second) in enumerate(pairs):
-        share[k, first] += 0.5
-        share[k, second] += 0.5  # of one with itself 1
+    for row, (first, second) in zip(share, pairs, strict=True):
+        row[first] += 0.5
+        row[second] += 0.5  # of one with itself 1
     return np.asarray(np.linalg.lstsq(share, asked, rcond=None)[0])
 
 
 def _of_largest(pairs: FloatArray, asked: FloatArray, count: int) -> FloatArray:
     """Numbers of which no pair has a larger maximum than `asked`: the largest such."""
     found = np.full(count, np.inf)
-    for k, pair in enumerate(pairs):
-        found[pair] = np.minimum(found[pair], asked[k])
+    for pair, most in zip(pairs, asked, strict=True):
+        found[pair] = np.minimum(found[pair], most)
     return found
 
 

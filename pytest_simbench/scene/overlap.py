@@ -149,12 +149,12 @@ def distance(offset: FloatArray, a: Core, turn_a: FloatArray, b: Core, turn_b: F
         of_a = turn_a @ a.farthest(direction @ turn_a)
         return np.asarray(of_a - offset - turn_b @ b.farthest(-direction @ turn_b))
 
-    return _nearest_to_origin(farthest, offset)
+    return _nearest_to_origin(farthest, -offset)
 
 
 def _nearest_to_origin(farthest: Callable[[FloatArray], FloatArray], start: FloatArray) -> float:
     """Distance from the origin of a convex body that tells its farthest point in a direction."""
-    nearest = farthest(start)
+    nearest = farthest(-start)
     corners = [nearest]
     for _ in range(STEPS):
         length = float(np.linalg.norm(nearest))

@@ -55,7 +55,7 @@ def combined(scene: Scene, rule: str, links: Sequence[str] = ()) -> tuple[Scene,
     gaps = np.abs(RULES[rule](solved[first], solved[second]) - asked)
     ground, *others = solved.tolist()
     robot = scene.robot and replace(scene.robot, friction=others.pop())
-    bodies = tuple(body.with_friction(others[k]) for k, body in enumerate(scene.bodies))
+    bodies = tuple(body.with_friction(mu) for body, mu in zip(scene.bodies, others, strict=True))
     made = replace(scene, bodies=bodies, robot=robot, ground_friction=ground, friction_rule=rule)
     if not len(gaps) or gaps.max() < 1e-3:
         return made, ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,7 @@ class Polytope:
         SceneError: they lie in a plane, or are not 4 to `MOST` finite points.
     """
 
-    def __init__(self, points: Sequence[Sequence[float]] | FloatArray) -> None:
+    def __init__(self, points: Sequence[Vector3] | FloatArray) -> None:
         self.points: FloatArray = np.array(points, dtype=float)
         if self.points.ndim != 2 or self.points.shape[1:] != (3,):
             raise SceneError("the corners of a mesh are rows of 3 numbers [m]")
@@ -51,8 +51,7 @@ class Polytope:
         """Outward normals (m, 3) and the corners of each face: of all planes through three points
         those with no point beyond. A few dozen points make some ten thousand planes."""
         points, close = self.points - self.points.mean(axis=0), EVEN * self.size
-        threes = list(combinations(range(len(points)), 3))
-        a, b, c = points[threes].transpose(1, 0, 2)
+        a, b, c = (points[list(k)] for k in zip(*combinations(range(len(points)), 3), strict=True))
         normals = np.cross(b - a, c - a)
         areas = np.linalg.norm(normals, axis=1)
         wide = areas > EVEN * self.size**2
@@ -74,7 +73,8 @@ class Polytope:
         ]
         outward = np.array([sides[found[key]] * normals[found[key]] for key in whole])
         rings = [
-            _around(points, np.flatnonzero(members[key]), outward[k]) for k, key in enumerate(whole)
+            _around(points, np.flatnonzero(members[key]), normal)
+            for key, normal in zip(whole, outward, strict=True)
         ]
         return outward, rings
 
@@ -93,7 +93,7 @@ class Polytope:
     @cached_property
     def edges(self) -> FloatArray:
         """Directions of its edges, each once, unit vectors (n, 3)."""
-        rings = [pairwise([*face, face[0]]) for face in self.faces]
+        rings = [zip(face, [*face[1:], face[0]], strict=True) for face in self.faces]
         pairs = sorted({(min(pair), max(pair)) for ring in rings for pair in ring})
         ways = np.array([self.points[b] - self.points[a] for a, b in pairs])
         ways /= np.linalg.norm(ways, axis=1, keepdims=True)
@@ -178,7 +178,7 @@ def principal(points: Sequence[Sequence[float]] | FloatArray) -> tuple[tuple[Vec
     Raises:
         SceneError: the points lie in a plane, or are none.
     """
-    found = Polytope(points)
+    found = Polytope(np.array(points, dtype=float))
     found = Polytope(found.points[found.corners])
     turn = np.eye(3)
     if not found.aligned:

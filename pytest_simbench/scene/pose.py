@@ -24,7 +24,7 @@ def vector3(values: Iterable[float]) -> Vector3:
 
 def rotation_matrix(quaternion: Sequence[float] | FloatArray) -> FloatArray:
     """Rotation matrix (3, 3) of a quaternion w, x, y, z, which is normalised first."""
-    q = np.asarray(quaternion)
+    q = np.asarray(quaternion, dtype=float)
     return unit_rotation(q / np.linalg.norm(q))
 
 

@@ -139,10 +139,9 @@ class Scene(Wire):
                     f"scene {self.name!r}: {name!r} is kept apart and not there; name two of "
                     "'ground', 'body/NAME' and 'link/NAME'"
                 )
-        far, aside, up = self.room
         for body in self.free_bodies:
-            x, y, z = body.pose.position
-            if abs(x) > far or abs(y) > aside or z > up:
+            at = zip(map(abs, body.pose.position[:2]), self.room[:2], strict=True)
+            if any(value > wall for value, wall in at) or body.pose.position[2] > self.room[2]:
                 raise SceneError(
                     f"scene {self.name!r}: {body.name!r} is outside the room {self.room} [m]; move "
                     "it, or give the scene a larger `room`"

@@ -141,7 +141,7 @@ def _converted(value: Any, hint: Any, where: str) -> Any:
         kinds = get_args(hint)
         if not isinstance(parts, list | tuple) or len(parts) != len(kinds):
             raise SettingsError(f"{where}={text}: give {len(kinds)} numbers, separated by '/'")
-        return tuple(_converted(part, kinds[k], where) for k, part in enumerate(parts))
+        return tuple(_converted(p, k, where) for p, k in zip(parts, kinds, strict=True))
     found = _of_type(value, hint)
     if found is None:
         raise SettingsError(f"{where}={text}: {_ADVICE.get(hint, f'give a {hint.__name__}')}")

@@ -237,7 +237,8 @@ def arm(urdf: Path, finger_angle: float, start: tuple[float, ...]) -> Robot:
     """
     description = keep(described(urdf, finger_angle), {})
     joints = (
-        Joint(name, STIFFNESS, DAMPING, EFFORT, ARMATURE, start[k]) for k, name in enumerate(JOINTS)
+        Joint(name, STIFFNESS, DAMPING, EFFORT, ARMATURE, at)
+        for name, at in zip(JOINTS, start, strict=True)
     )
     packages = {"kinova_description": str(urdf.parent)}
     hand = Gripper((), 0.0, 0.0, 0.0)
@@ -285,8 +286,8 @@ def _pushed(run: ArmRun) -> int:
 
 
 def yaw(row: FloatArray) -> float:
-    """Turn about the vertical of a row of position and quaternion, of any length, (7,) [rad]."""
-    return Pose.from_array(np.append(row[:3], row[3:] / np.linalg.norm(row[3:]))).yaw
+    """Turn about the vertical of a row that begins with position and quaternion [rad]."""
+    return Pose.from_array(row[:7] / np.array([1, 1, 1, *[np.linalg.norm(row[3:7])] * 4])).yaw
 
 
 def _turn(rows: FloatArray) -> float:
