@@ -195,10 +195,10 @@ def test_what_pip_is_configured_with(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     config.write_text("[global]\nindex-url = a\n[install]\nretries = 3\n[list]\nformat = c\n")
     monkeypatch.setenv("PIP_CONFIG_FILE", str(config))
     monkeypatch.setenv("PIP_INDEX_URL", "mine")
-    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", "it's \"d\"")
+    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", 'it\'s "d"')
     found = package_index.pip_configuration()
     told = [found.get(n) for n in ("index-url", "extra-index-url", "retries", "format")]
-    assert told == ["mine", "it's \"d\"", "3", None]
+    assert told == ["mine", 'it\'s "d"', "3", None]
     monkeypatch.delenv("PIP_INDEX_URL")
     assert package_index.pip_configuration()["index-url"] == "a"
 
