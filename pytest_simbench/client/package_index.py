@@ -109,8 +109,7 @@ def pip_configuration() -> dict[str, str]:
         key, equals, value = line.partition("=")
         section, _, name = key.rpartition(".")
         if equals and section in ("global", "install", ":env:"):
-            kept = section != ":env:" and os.environ.get(f"PIP_{name.upper().replace('-', '_')}")
-            found[name] = kept or value[1:-1]
+            found[name] = os.environ.get(f"PIP_{name.upper().replace('-', '_')}") or value[1:-1]
     return found
 
 

@@ -16,6 +16,7 @@ import pytest_simbench as simbench
 from pytest_simbench.cli.runs import printed
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.tasks import Stacking
+from tests.approval import assert_approved
 from tests.records.build import record
 
 Write = Callable[..., simbench.Run]
@@ -50,6 +51,20 @@ def test_the_table_is_what_pytest_prints(write: Write) -> None:
     assert run.table(verbose=True).html.count("<table>") > 1
     assert run._repr_html_() == html
     assert repr(run) == f"<Run {run.folder}: 24 repetitions of stacking on one, two>"
+
+
+def test_all_that_is_said_of_a_run(
+    write: Write, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("COLUMNS", "110")
+    monkeypatch.chdir(tmp_path)
+    write("before"), write("run", second=0.2)
+    with Path("run/records.jsonl").open("a") as file:
+        file.write("half a line\n")
+    run = simbench.load("run")
+    shown = run.table(), run.table(verbose=True), run.compare(), run.compare("before")
+    text = "\n====\n".join([*map(str, shown), shown[0].html, shown[3].html, repr(run)])
+    assert_approved("api", text)
 
 
 def test_html_of_a_notebook_is_escaped(tmp_path: Path) -> None:

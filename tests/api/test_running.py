@@ -82,6 +82,12 @@ def test_how_often_is_as_in_pytest(scripted: dict[str, Any]) -> None:
     assert {(r.jitter, r.mode, r.profile) for r in fast} == {(1.0, "headless", "tuned")}
     assert [r.seed for r in fast] == list(range(10001, 10021))
     assert len(simbench.run(Falling(), "mujoco", protocol="smoke").contents.records) == 1
+    (one,) = simbench.run(
+        Falling(), "mujoco", 1, protocol="paper", timeout=7, jitter=0, profile="real"
+    ).contents.records
+    limits = {"timeout": 7.0, "stall_timeout": 60.0, "memory_limit": None}
+    assert (one.protocol, one.limits) == ("paper", limits)
+    assert (one.jitter, one.profile) == (0.0, "real")
 
 
 def test_profiles_and_robots_stand_in_the_ids(scripted: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ import pytest_simbench
 from pytest_simbench.cli import environments, simulators
 from pytest_simbench.cli.main import COMMANDS, GROUPS
 from pytest_simbench.simulator.registry import adapter, registered
-from tests.approval import assert_approved
+from tests.approval import assert_approved, assert_approved_line
 from tests.cli.command import said
 from tests.cluster.machines import release_in
 from tests.motion.small_arm import URDF, small_arm
@@ -127,6 +127,10 @@ def test_what_cannot_be_is_one_sentence(
     assert status == 2
     assert told.count("\n") == 1
     assert fnmatchcase(told.splitlines()[-1], sentence)
+    if words != "lst":  # which each Python words in its own way
+        assert_approved_line(
+            "refused", f"simbench {words}: {told[:-1]}".replace(f"{tmp_path}", "DIR")
+        )
 
 
 def test_all_that_is_said_of_simulators_that_are_not_here(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -152,6 +152,9 @@ def test_a_badge_that_cannot_be_written_ends_badly(here: Path) -> None:
     assert merge_runs(["a"], output="whole", badge=".") == 1
     assert report_runs(["a"], badge=".") == 1
     assert report_runs(["a"], badge="badge.json") == 0
+    for end in merge_runs, report_runs:  # so does a page
+        (here / end.__name__ / "report.html").mkdir(parents=True)
+        assert end(["a"], output=end.__name__) == 1
 
 
 def test_the_same_run_by_another_name_is_given_twice(here: Path) -> None:

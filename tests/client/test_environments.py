@@ -189,6 +189,20 @@ def test_uv_is_taken_from_beside_the_interpreter_or_else_from_the_path(
     assert found == [None, str(places[1]), str(places[0])]
 
 
+def test_what_pip_is_configured_with(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """What concerns other commands is none of it; a variable is as it is, quotes and all."""
+    config = tmp_path / "pip.conf"
+    config.write_text("[global]\nindex-url = a\n[install]\nretries = 3\n[list]\nformat = c\n")
+    monkeypatch.setenv("PIP_CONFIG_FILE", str(config))
+    monkeypatch.setenv("PIP_INDEX_URL", "mine")
+    monkeypatch.setenv("PIP_EXTRA_INDEX_URL", 'it\'s "d"')
+    found = package_index.pip_configuration()
+    told = [found.get(n) for n in ("index-url", "extra-index-url", "retries", "format")]
+    assert told == ["mine", 'it\'s "d"', "3", None]
+    monkeypatch.delenv("PIP_INDEX_URL")
+    assert package_index.pip_configuration()["index-url"] == "a"
+
+
 def test_pips_configuration_is_uvs_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("UV_INDEX", "mine")
     told = {"index-url": "a", "extra-index-url": "b c", "find-links": "d e", "timeout": "9"}

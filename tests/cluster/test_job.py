@@ -4,26 +4,38 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from pytest_simbench.client.errors import Diverged, Where, WorkerError
-from pytest_simbench.cluster.executor import ClusterExecutor
+from pytest_simbench.client.errors import Diverged, Interrupted, NodeLost, Where, WorkerError
+from pytest_simbench.cluster.executor import ClusterExecutor, _Lost
 from pytest_simbench.cluster.job import Job, Packed, TaskFailed, error_from_wire, error_to_wire
 from pytest_simbench.cluster.node import LatestJobs
+from pytest_simbench.cluster.offers import Node
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.experiment.identity import describe_robot, expected
+from pytest_simbench.experiment.identity import (
+    describe_robot,
+    expected,
+    file_stem,
+    record_of,
+    settings,
+)
 from pytest_simbench.experiment.policy_file import read_policies
+from pytest_simbench.experiment.repetition import Hooks
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
+from pytest_simbench.records.notes import Notes
+from pytest_simbench.records.record import Failure
 from pytest_simbench.scene import Scene
 from pytest_simbench.tasks import Holding, Reaching, Settling, Stacking
-from tests.cluster.test_pool import A, Told
+from tests.cluster.test_pool import A, B, Told, lab
 from tests.tiny import Falling
 
 
@@ -151,6 +163,84 @@ def test_errors_come_back_as_what_they_are() -> None:
     assert str(other) == "ZeroDivisionError: division by zero\nTraceback ..."
     assert str(error_from_wire(error_to_wire(ValueError("x")), where)) == "ValueError: x"
     assert error_from_wire(error_to_wire(None), where) is None
+
+
+def test_what_a_node_sends_is_the_record_but_for_what_only_this_side_knows(case: Case) -> None:
+    experiment, where = Experiment(case, Falling(0.3)), Where("mujoco", "headless", 2, 7, "fall")
+    one: Any = ClusterExecutor(Told([A])).repetition(experiment, 2)
+    one._node, one._lost = A, ["b: gone"]
+    sent = record_of(
+        experiment, 2, status="failed", settings={"timestep": 0.1, "task.duration": 9.0},
+        versions={"mujoco": "4.0"}, host={"cpu": "theirs"}, notes=Notes(log="logs/x.log"),
+    )  # fmt: skip
+    theirs = replace(sent, scene="of another file", task_code="of another file")
+    error = error_to_wire(Diverged("it flew", where))
+    answer = {"record": theirs.to_json(), "error": error, "log": b"said", "trace": b"moved"}
+    record, ended = one._received(answer)
+    kept = Notes(log="logs/x.log", lost_nodes=("b: gone",))
+    told = {"timestep": 0.1, "task.duration": 0.3}
+    assert record == replace(sent, host={"cpu": "theirs", "node": "a"}, notes=kept, settings=told)
+    assert (type(ended), ended.what) == (Diverged, "it flew")
+    trace = case.folder / "traces" / f"{file_stem(experiment, 2)}.npz"
+    assert [(case.folder / "logs/x.log").read_bytes(), trace.read_bytes()] == [b"said", b"moved"]
+    trace.unlink(), trace.mkdir()
+    outside = replace(theirs, notes=Notes(log="x.log")).to_json()
+    record, _ = one._received({**answer, "record": outside})
+    assert record.notes.trace.startswith("the trace could not be written: [Errno 21] Is a dir")
+    assert not (case.folder / "x.log").exists()
+
+    for why, status, what in (
+        (NodeLost("gone", where), "failed", "gone"), (TaskFailed("no"), "failed", "no"),
+        (Interrupted("over", where), "interrupted", str(Interrupted("over", where))),
+    ):  # fmt: skip
+        assert one._without_result(why, 3.5) == record_of(
+            experiment, 2, status=status, settings=settings(case), versions={},
+            error=Failure(type(why).__name__, what, "fall"), seconds={"total": 3.5},
+            notes=Notes(lost_nodes=("b: gone",)), host={"node": "a"},
+        )  # fmt: skip
+
+
+LACKS, FAILS, OK = ({"error": e} for e in ({"type": "Unavailable"}, {"type": "Diverged"}, None))
+
+
+@pytest.mark.parametrize(
+    ("ends", "asked", "told"),
+    [
+        (["gone", OK], "ba", ""), ([{"unknown": "0"}, OK], "bb", ""), ([FAILS], "b", ""),
+        ([LACKS, OK], "ba", ""), ([LACKS, LACKS], "ba", ""),
+        (["gone", "full"], "ba",
+         "it was lost on b: gone, then on a: full; it is not tried again"),
+    ],
+)  # fmt: skip
+def test_which_nodes_are_asked(case: Case, ends: list[Any], asked: str, told: str) -> None:
+    begun: list[str] = []
+    executor = ClusterExecutor(Told([A, B]))
+    one: Any = executor.repetition(Experiment(case, Falling()), 1, Hooks(begin=begun.append))
+
+    def on(node: Node, key: str, job: Packed) -> Any:
+        executor.pool.release(key)
+        end = ends[len(begun) - 1]
+        if isinstance(end, str):
+            raise _Lost(end)
+        return end
+
+    one._on = on
+    with pytest.raises(NodeLost, match=f"^{told}") if told else nullcontext():
+        assert one._answer() == ends[-1]
+    assert "".join(begun) == asked
+    one.kill()
+    with pytest.raises(Interrupted):
+        one._answer()
+    assert not executor.pool._mine
+
+
+def test_without_a_node_that_offers_it_a_repetition_fails(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pytest_simbench.cluster.pool.PATIENCE", 0.0)
+    executor = ClusterExecutor(Told([lab("c", "drake==1.51")]))
+    with pytest.raises(NodeLost, match="^no other node offers it"):
+        executor.repetition(Experiment(case, Falling()), 1)._answer()  # type: ignore[attr-defined]
 
 
 def test_one_machine_marks_what_runs_side_by_side(case: Case) -> None:

@@ -16,6 +16,7 @@ import pytest_simbench.tasks  # noqa: F401 - pytester would import native module
 from pytest_simbench.plugin.session import session_of
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
+from tests.approval import assert_approved_line
 from tests.motion.small_arm import TOML, small_arm
 from tests.plugin.inner import CLAIMING, run_pytest, usage_error, wrapper
 
@@ -150,8 +151,11 @@ def refusal(pytester: pytest.Pytester, words: str) -> str:
 
     with pytest.raises(pytest.UsageError) as raised:
         begin()
-    assert "\n" not in str(raised.value)
-    return str(raised.value)
+    told = str(raised.value)
+    assert "\n" not in told
+    if "/proc" not in words:  # which depends on the machine
+        assert_approved_line("refused", f"{words:.80}: {told}".replace(f"{pytester.path}", "DIR"))
+    return told
 
 
 @pytest.mark.usefixtures("files")
@@ -214,3 +218,4 @@ def test_bad_marks_are_told_all_at_once(pytester: pytest.Pytester) -> None:
     for number, (_, message) in enumerate(BAD_MARKS):
         (told,) = (line for line in lines if f"::test_{number}: " in line)
         assert all(part in told for part in message.split("*")), told
+        assert_approved_line("refused", told)
