@@ -61,6 +61,11 @@ def test_arrays_are_read(tmp_path: Path) -> None:
     found = read_arrays(tmp_path / "a.npz", 10_000)
     assert found["x"].tolist() == [0, 1, 2]
     assert found["names"].tolist() == ["a", "b"]
+    np.savez_compressed(tmp_path / "b.npz", x=np.zeros(10_000))
+    size = 80_000 + 128  # with the header of a .npy file
+    assert len(read_arrays(tmp_path / "b.npz", size)["x"]) == 10_000
+    with pytest.raises(FileError, match="cannot read the arrays in .*b.npz: it is larger than"):
+        read_arrays(tmp_path / "b.npz", size - 1)
 
 
 class Evil:

@@ -83,6 +83,8 @@ def test_an_older_release_is_refused_in_one_sentence() -> None:
 def test_what_a_release_needs_besides(version: str, needs: tuple[str, ...]) -> None:
     info = INFO.of_version(VersionedName("sim", "==", version))
     assert (info.requirements, info.home, info.name) == (needs, "", f"sim=={version}")
+    bare = replace(INFO, companions={}).of_version(VersionedName("sim", "==", version))
+    assert bare.requirements == (needs[0], "numpy")
 
 
 def test_the_pinned_release_has_the_environment_of_the_bare_name_and_a_build_none() -> None:

@@ -161,6 +161,9 @@ def test_sizes_hold_for_the_robot_they_were_measured_on() -> None:
         assert not finger.with_robot(robot).excuses("joint/panda_finger_joint2/effort_limit")
     assert hull.with_robot(ur5).within == 1e-3
     assert replace(hull, elsewhere=None).with_robot(ur5).within == 5e-4
+    fingers = Gripper(ur5.joint_names[:3], 1.0, 0.0, 1.0)
+    three = replace(ur5, gripper=fingers, limits=None, swing=None)
+    assert hull.with_robot(three).quantity == hull.quantity
     assert finger.with_robot(ur5).excuses("joint/panda_joint2/effort_limit")
     assert not finger.with_robot(ur5).excuses("joint/panda_joint1/effort_limit")
 

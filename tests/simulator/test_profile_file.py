@@ -56,7 +56,8 @@ def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
 
 
 def test_what_is_written_is_read_again(tmp_path: Path) -> None:
-    chosen = {"by": 'a "quoted"\nname', "seeds": [["stacking", 7, 9]], "versions": {"a-b": "1"}}
+    by = 'a "quoted"\nname \U0001f600'
+    chosen = {"by": by, "seeds": [["stacking", 7, 9]], "versions": {"a-b": "1"}}
     text = write_profile("tuned", "mujoco", {"timestep": 0.004, "solref": (0.01, 1.0)}, chosen)
     assert read_profile(written(tmp_path, text)) == read_profile(written(tmp_path, TEXT))
     text = write_profile("default", "ovphysx", {"contact_offset": None}, {})

@@ -17,6 +17,7 @@ from pytest_simbench.simulator.settings import (
     Log,
     changed,
     changes,
+    flaw,
     meanings,
     searched,
 )
@@ -67,6 +68,8 @@ def test_texts_become_values(name: str, text: Any, value: Any) -> None:
         ({3: 3}, "mujoco has no setting 3; choose from .*timestep=0.002"),
         ({"x" * 9999: 3}, "mujoco has no setting 'xxxxx.{,40}; choose from .*timestep=0.002"),
         ({"cone": "x" * 9999}, "mujoco.cone='xxxxx.{,40}: choose from pyramidal, elliptic"),
+        ({"cone": "x" * 40}, "mujoco.cone='xxxxx.{,40}: choose from pyramidal, elliptic"),
+        ({"cone": "x" * 39}, f"mujoco.cone={39 * 'x'}: choose from pyramidal, elliptic"),
     ],
 )
 def test_bad_changes(changes: dict[str, Any], message: str) -> None:
@@ -104,6 +107,29 @@ class Some(Settings):
     first: Annotated[int, Linear(0, 5, when=("third", "a"))] = 3
     second: tuple[float, Annotated[float, Linear(0.5, 4)]] = (0.02, 1.0)
     third: Annotated[Literal["a", "b"], EACH] = "a"
+
+
+@dataclass(frozen=True)
+class Named(Settings):
+    solver: str = "newton"
+
+
+class Bare(Settings):
+    solver = "newton"
+
+
+def test_a_setting_may_be_a_text() -> None:
+    assert changed(Named(), {"solver": "pgs"}, "sim") == Named(solver="pgs")
+    with pytest.raises(SettingsError, match=r"^sim.solver=3: give a str$"):
+        changed(Named(), {"solver": 3}, "sim")
+
+
+def test_profiles_are_instances_of_dataclasses() -> None:
+    assert flaw({"default": Settings(), "tuned": Named()}) == ""
+    told = "what the class sets counts in a dataclass alone: write @dataclass(frozen=True) above "
+    assert flaw({"default": Settings(), "tuned": Bare()}) == f"{told}class Bare"
+    told = "profile 'tuned' is no instance of a class of Settings: "
+    assert flaw({"tuned": 60 * "x"}) == f"{told}'{59 * 'x'}"
 
 
 def test_ranges_are_read_from_the_annotations() -> None:
