@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose
-from pytest_simbench.tasks.base import CUBE_SIZE
-from tests.tasks.scripted import HALF, Mishap, ScriptedProcess
+from tests.tasks.scripted import Mishap, ScriptedProcess
 
 GRAVITY = np.array(STANDARD_GRAVITY)
 
@@ -46,8 +45,9 @@ class FlyingProcess(ScriptedProcess):
         velocity: Callable[[FloatArray], FloatArray] = lambda velocity: velocity,
         drop: float = 0.0,
         timestep: float = 0.004,
+        scale: float = 1.0,
     ) -> None:
-        super().__init__(script, timestep=timestep)
+        super().__init__(script, timestep=timestep, scale=scale)
         self.pushed = dict(pushed or {})
         self.late = late
         self.change = velocity
@@ -103,11 +103,11 @@ class FlyingProcess(ScriptedProcess):
             self.poses[PROJECTILE] = Pose.at(*place, yaw=yaw)
             self.velocities[PROJECTILE] = np.concatenate([velocity + GRAVITY * t, np.zeros(3)])
             touched = self._touched(place)
-            if touched or place[2] <= HALF:
+            if touched or place[2] <= self.half:
                 self.flying = None
                 self.velocities[PROJECTILE] = np.zeros(6)
                 self.landed_at = now
-                self.poses[PROJECTILE] = Pose.at(place[0], place[1], HALF, yaw=yaw)
+                self.poses[PROJECTILE] = Pose.at(place[0], place[1], self.half, yaw=yaw)
                 if touched:
                     self.touched_at = now
                     self.poses[PROJECTILE] = Pose.at(*place, yaw=yaw)
@@ -120,12 +120,12 @@ class FlyingProcess(ScriptedProcess):
             if share == 1.0:
                 self._places = {}
                 x, y, _ = self.poses[PROJECTILE].position
-                self.poses[PROJECTILE] = Pose.at(x, y, HALF)
+                self.poses[PROJECTILE] = Pose.at(x, y, self.half)
 
     def _touched(self, place: FloatArray) -> bool:
         return any(
             name != PROJECTILE
-            and np.abs(np.subtract(pose.position, place)).max() < CUBE_SIZE + 0.001
+            and np.abs(np.subtract(pose.position, place)).max() < 2 * self.half + 0.001
             for name, pose in self.poses.items()
         )
 

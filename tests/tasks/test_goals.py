@@ -64,11 +64,23 @@ def test_what_is_to_be_placed_stands_apart_from_its_place(seed: int) -> None:
     assert PickAndPlace(limp).goal(seed).position[2] == pytest.approx(0.075)
 
 
-def test_a_small_arm_has_a_small_scene() -> None:
-    small = PushingToGoal(limp, robot=known_robot("so101"))
-    assert small.scale < 0.6
-    way = np.subtract(small.goal(1).position, small.begin(1).position)
-    assert np.linalg.norm(way) < 0.15 * 0.6
+@pytest.mark.parametrize(
+    ("kind", "scale"), [(Reaching, 0.5), (PushingToGoal, 0.5), (PickAndPlace, 0.4)]
+)
+def test_a_small_arm_has_a_similar_scene(kind: type[GoalTask], scale: float) -> None:
+    """At the same density, and it must come as much nearer."""
+    small, full, still = kind(limp, robot=known_robot("so101")), kind(limp), Jitter(0.0, 0.0)
+    goal, near = small.goal(1), small.tolerance * scale
+    assert goal.position == pytest.approx(np.multiply(scale, full.goal(1).position))
+    for body, other in zip(small.scene(1, still).bodies, full.scene(1, still).bodies, strict=True):
+        assert body.extents == pytest.approx(np.multiply(scale, other.extents))
+        assert body.pose.position == pytest.approx(np.multiply(scale, other.pose.position))
+        assert body.mass == pytest.approx(scale**3 * other.mass)
+    for off, there in ((0.99 * near, True), (1.01 * near, False)):
+        at = goal.translated(off)
+        seen: Any = SimpleNamespace(tool=at, pose=lambda name, at=at: at)
+        assert small.reached(seen, 1) == there
+    assert f"within {100 * near:g} cm of the goal" in small.metrics[0].doc
 
 
 def test_a_record_tells_which_policy_it_was() -> None:

@@ -187,6 +187,10 @@ def test_a_small_arm_has_a_way_of_its_size() -> None:
     assert end.yaw == pytest.approx(full.yaw)
     assert small.sharpest < small.way / small.turn  # so theory holds, and zero errors are right
     assert small.references
+    tools, others = (np.array([tool.position for tool in t.tools()]) for t in (small, CURVE))
+    assert tools[:, 2] == pytest.approx(others[:, 2] / 2)
+    ways = [np.linalg.norm(np.diff(rows, axis=0), axis=1) for rows in (tools, others)]
+    assert ways[0][0] == pytest.approx(ways[1][0] / 2)  # of the gap, where the way is straight
 
 
 def test_the_smallest_arm_pushes_too(case: Case) -> None:

@@ -14,7 +14,7 @@ from pytest_simbench.client.errors import Diverged, RepetitionTimeout
 from pytest_simbench.records.notes import Wait
 from pytest_simbench.scene import Pose
 from pytest_simbench.tasks import Jitter, Stacking
-from pytest_simbench.tasks.stacking import Place, _placed, _strict
+from pytest_simbench.tasks.stacking import Place, _placed, _strict, _strictly
 from tests.tasks.scripted import (
     Mishap,
     ScriptedProcess,
@@ -164,6 +164,18 @@ def test_a_tower_is_complete_with_all_of_its_cubes_strictly_in_place() -> None:
 def test_in_its_place_and_strictly_so(pose: Pose, placed: bool, strict: bool) -> None:
     """5 cm in x and in y; 1 cm in x, y and z and 5 degrees, whatever face it lies on."""
     assert (_placed(PLACE, pose), _strict(PLACE, pose)) == (placed, strict)
+
+
+def test_how_far_a_corner_is_from_leaving_what_is_strictly_the_place() -> None:
+    """By a shift, or by one of the 5 degrees, half a space diagonal from the middle."""
+    half = math.radians(4) / 2
+    leaning = Pose((0.001, 0.0, 0.0), (math.cos(half), math.sin(half), 0.0, 0.0))
+    for scale in (1.0, 0.5):
+        found = _strictly(PLACE, leaning, scale)
+        assert found == pytest.approx(math.radians(1) * math.sqrt(3) * 0.025 * scale)
+        assert _strictly(PLACE, Pose.at(0.0, 0.004, 0.0), scale) == pytest.approx(
+            min(0.01 * scale - 0.004, math.radians(5) * math.sqrt(3) * 0.025 * scale)
+        )
 
 
 def test_the_wait_ends_when_no_count_can_change_any_more() -> None:

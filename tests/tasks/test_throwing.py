@@ -76,6 +76,28 @@ def test_a_perfect_throw() -> None:
     assert set(metrics) == {metric.name for metric in TASK.metrics}
 
 
+@pytest.mark.parametrize(("push", "moved"), [(0.046, 1), (0.044, 0)])
+def test_in_a_smaller_scene_all_lengths_are_smaller(push: float, moved: int) -> None:
+    """By a tenth: cubes count from 45 mm on, and a flight ends at that height."""
+    task = Throwing(settle=3.0)
+    vars(task)["scale"] = 0.9
+    outcome, process = thrown(
+        *(Mishap("settle", 1.0, move(name, y=y)) for name, y in (("pyramid_1", -0.044),
+                                                                 ("pyramid_3", 0.046))),
+        task=task, scale=0.9, pushed={"pyramid_6": (0.0, push, 0.0)},
+        velocity=lambda velocity: 0.93 * velocity,
+    )  # fmt: skip
+    assert process.touched_at is not None
+    assert values(outcome) == {"moved": moved / 6, "hit": moved, "moved_otherwise": 1.0}
+    release = outcome.details["release"]
+    rise, fall = release["velocity"][2], release["position"][2] - 0.045
+    flown = (rise + math.sqrt(rise**2 - 2 * GRAVITY[2] * fall)) / -GRAVITY[2]
+    landing = release["position"][0] + release["velocity"][0] * flown
+    assert outcome.metrics["landing_x"] == pytest.approx(landing)
+    docs = " ".join(metric.doc for metric in task.metrics)
+    assert (docs.count("4.5 cm"), docs.count("z = 0.045")) == (2, 2)
+
+
 def test_the_details_explain_it() -> None:
     """What was released and flew, beside what a perfect follower's throw is."""
     outcome, _ = thrown(pushed={"pyramid_6": (0.10, 0.0, -0.05)}, late=0.1, drop=0.05)
