@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -21,6 +24,51 @@ class Recorded(Search):
 
     def run(self, *places: int) -> None:
         self.ran.update({f"test_stacking[{self.named(place)}-headless]": "" for place in places})
+
+
+JUNIT = """<testsuite>
+<testcase classname="test_a" name="test_x[sim==1.9]"><properties>
+<property name="falling 1: repetitions" value="3"/></properties></testcase>
+<testcase classname="test_a" name="test_y"/>
+<testcase classname="b" name="c"><skipped message="not here&#10;at all"/></testcase></testsuite>"""
+
+
+@pytest.mark.parametrize(("folder", "keep"), [("new", "--sim-output"), ("old", "--sim-resume")])
+def test_what_a_run_is_asked_and_what_is_kept_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str, keep: str
+) -> None:
+    asked: list[list[str]] = []
+    ended = SimpleNamespace(returncode=1, stdout="")
+
+    def run(command: list[str], **options: Any) -> Any:
+        asked.append(command)
+        place = next(w for w in command if w.startswith("--junitxml=")).partition("=")[2]
+        Path(place).write_text(JUNIT)
+        return ended
+
+    monkeypatch.setattr("pytest_simbench.cli.search.subprocess.run", run)
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old/records.jsonl").write_text("{}\n")
+    one = Search("sim", "landed", RELEASES, tmp_path / folder, ["test_a.py", "--reps=3"])
+    one.run(1, 4)
+    (words,) = asked
+    assert words[:3] == [sys.executable, "-m", "pytest"]
+    assert [w for w in words[3:] if "junitxml" not in w] == [
+        "test_a.py", "--reps=3", f"{keep}={tmp_path / folder}", "--sim-name=sim==1.9,sim==1.12",
+        "--sim-install-missing", "-q", "--junitprefix=",
+    ]  # fmt: skip
+    assert one.ran == {
+        "test_a.test_x[sim==1.9]": "", "test_a.test_y": "it repeats no task", "b.c": "not here",
+    }  # fmt: skip
+    lost = (
+        '<testcase name="t"><failure message="Failed: t is not resumed, since&#10;x"/></testcase>'
+    )
+    monkeypatch.setitem(globals(), "JUNIT", lost)
+    with pytest.raises(BadInput):
+        one.run(1)
+    ended.returncode, ended.stdout = 4, "a\n\nb\n  \nc\nERROR: no"
+    with pytest.raises(BadInput):
+        one.run(1, 2)
 
 
 def search(folder: Path, *ends: float, moved: float | None = None) -> Search:

@@ -157,7 +157,7 @@ def test_the_list_is_a_table(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_broken_adapter_hides_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulators, "known", lambda: ["drake", "mujoco", "ode"])
+    monkeypatch.setattr(simulators, "known", lambda: ["drake", "mujoco", "ode", "sapien"])
     monkeypatch.setattr(simulators, "problem", {"drake": "no class"}.get)
     monkeypatch.setattr(simulators, "_version", {"ode": "0.16.6"}.get)
     lines = [*simulators._table({"mujoco": "no"}.get)]
@@ -165,6 +165,7 @@ def test_a_broken_adapter_hides_no_other(monkeypatch: pytest.MonkeyPatch) -> Non
         "drake - BROKEN: no class",
         "mujoco - no: not here; simbench list mujoco says how to get it",
         "ode 0.16.6 yes yes yes 2 ms",
+        "sapien - yes yes yes 4 ms",
     ]
     lines = [*simulators._paragraphs(["drake", "ode"], lambda name: None, {"ode": "/o"}, False)]
     assert lines[:2] == ["drake: BROKEN: no class", ""]

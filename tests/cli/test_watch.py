@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
+from datetime import date
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from pytest_simbench.cli import watch
 from pytest_simbench.cli.main import main
+from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.measure.watching import Step
+from pytest_simbench.records.folder import RunFolder
 from tests.approval import assert_approved_line
 from tests.plugin.planted import offer, plant
+from tests.records.build import record
 
 DRIVER = """
 import sys
@@ -96,6 +102,48 @@ def work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
     monkeypatch.setattr(watch, "releases", lambda distribution: RELEASES)
     monkeypatch.setattr(watch.Runs, "judged", judged)
     return ran
+
+
+@pytest.mark.parametrize("releases", [["1.2"], ["1.1", "1.2", "1.3"]])
+def test_what_is_run_on_the_releases(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, releases: list[str]
+) -> None:
+    """A scene of an engine that has the profile `file` is run as the file has it, a URDF is not."""
+    asked: list[Any] = []
+
+    class Kept(Search):
+        def run(self, *places: int) -> None:
+            asked.append((self.simulator, places, self.releases, self.arguments))
+            assert self.folder.parents[1] == tmp_path
+            run = RunFolder(self.folder)
+            run.append(record(1, simulator="mujoco==1.2"))
+            run.flush()
+
+    monkeypatch.setattr(watch, "Search", Kept)
+    scenes = [tmp_path / name for name in ("a.xml", "b.URDF")]
+    for scene in scenes:
+        scene.write_text("x")
+    found = watch.Runs("mujoco", releases, tmp_path, 5, scenes).judged((), 2)
+    if len(releases) == 1:
+        assert (found, asked) == ([], [])
+        return
+    tuned = "--sim-profile=tuned"
+    assert asked == [
+        ("mujoco", (0, 1, 2), releases, words) for words in (
+            (*watch.LAWS_RUN, tuned), (*watch.TASKS_RUN, tuned, "--reps=5"),
+            (*watch.SCENE_RUN, f"--sim-scene={scenes[0]}", "--sim-profile=file"),
+            (*watch.SCENE_RUN, f"--sim-scene={scenes[1]}", tuned),
+        )
+    ]  # fmt: skip
+    assert [(s.engine, s.old, s.new) for s in found] == [
+        ("mujoco", "1.1", "1.2"), ("mujoco", "1.2", "1.3"),
+    ]  # fmt: skip
+    for step in found:
+        assert [*step.reports] == ["laws", "tasks", *map(str, scenes)]
+        assert step.day == date.today().isoformat()
+        for address in step.reports.values():
+            assert re.fullmatch(r"mujoco-1\.1-1\.3-[0-9a-f]+/[\w-]+/report\.html", address)
+    assert len({*found[0].reports.values()}) == 4
 
 
 def test_the_first_watch_notes_the_newest_and_the_next_begins_there(

@@ -9,20 +9,23 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from pytest_simbench.client import connection
+from pytest_simbench.client.closed_loop import shipped
 from pytest_simbench.client.errors import PolicyFailed, Where, WorkerExited, WorkerHung
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
+from pytest_simbench.ground.errors import PolicyError
 from pytest_simbench.motion.kinematics import Servo
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Pose, Scene
-from pytest_simbench.scene.policy import Command, LoopError, Observation, Policy
+from pytest_simbench.scene.policy import Command, Function, LoopError, Observation, Policy
 from pytest_simbench.tasks import Reaching
 from pytest_simbench.tasks.base import cube
 from tests.client.failing import failure
@@ -254,6 +257,29 @@ def test_what_cannot_run_inside(world: Worlds, policy: Any, told: str) -> None:
     one = world()
     with pytest.raises(PolicyFailed, match=told):
         one.control(policy, until=0.1, inside=True)
+
+
+def test_what_of_a_policy_goes_to_the_worker() -> None:
+    """Its source, its name there, and all that it holds."""
+    policy, path = Waving(0.1), sys.modules[Waving.__module__].__file__
+    told = {"path": path, "source": Path(str(path)).read_text(), "seed": 7}
+    found = shipped(policy, 7, Pose.at(1, 2, 3))
+    assert [*found.pop("goal")] == [1, 2, 3, 1, 0, 0, 0]
+    assert found == {**told, "name": "Waving", "state": {"amplitude": 0.1, "seed": 0}}
+    assert shipped(Function(still), 7, None) == {**told, "name": "still", "state": {}, "goal": None}
+
+
+def test_what_does_not_go_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    holding = Waving(0.1)
+    holding.lock, holding.act_as = threading.Lock(), len  # type: ignore[attr-defined]
+    typed: dict[str, Any] = {"Policy": Policy}
+    exec("class Typed(Policy):\n    name, act = 'typed', lambda self, seen: None", typed)
+    for policy in (Function(lambda seen: None), holding, typed["Typed"]()):
+        with pytest.raises(PolicyError):
+            shipped(policy, 1, None)
+    monkeypatch.setattr(still, "__module__", "__main__")
+    with pytest.raises(PolicyError):
+        shipped(Function(still), 1, None)
 
 
 def test_a_script_does_not_start_itself_again(

@@ -126,6 +126,11 @@ def test_what_is_there_and_removing_it(info: SimulatorInfo) -> None:
     environment = half_made(info)
     (environment.folder / "large").write_bytes(bytes(3_000_000))
     assert environments.size_mb(environment.folder) == pytest.approx(3.0, abs=0.1)
+    for name, version in (("sixty", "1.0"), ("Six", "1.2"), ("six", "2.0")):
+        told = environment.folder / f"lib/python3.9/site-packages/{name}-{version}.dist-info"
+        assert environment.version() == ("1.2" if version == "2.0" else None)
+        told.mkdir(parents=True)
+        (told / "METADATA").write_text(f"Name: {name}\nVersion: {version}\n")
     with environments.alone(environment.folder, print):
         assert list(existing()) == [environment.folder]
     remove(environment.folder)

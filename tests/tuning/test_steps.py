@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.simulator.registry import adapter
-from pytest_simbench.simulator.settings import Linear, Searched, searched
+from pytest_simbench.simulator.settings import Linear, Log, Searched, searched
 from pytest_simbench.tuning.steps import between, corners, near, own_values
 
 BASES = {name: adapter(name).profiles["tuned"] for name in ("mujoco", "drake", "sapien")}
@@ -47,6 +48,23 @@ def test_what_is_near_lies_in_the_range_and_is_another_value(name: str) -> None:
         assert values
         assert own.get(one.name) not in values
         assert all(within(value, one) for value in values)
+
+
+@pytest.mark.parametrize(
+    ("over", "whole", "own", "values"),
+    [
+        (Linear(0, 1), False, 0.2, [0, 1, 0.1, 0.6, 0.175, 0.3]),
+        (Linear(0, 10), True, 4, [0, 10, 2, 7, 5]),  # an eighth of the way down is its own
+        (Log(0.01, 100), False, 1.0, [0.01, 100, 0.1, 10, 0.5623, 1.778]),
+        (Log(0.01, 100), False, None, [0.01, 100]), (("a", "b", "c"), False, "b", ["a", "c"]),
+    ],
+)  # fmt: skip
+def test_what_is_near(over: Any, whole: bool, own: Any, values: list[Any]) -> None:
+    """The ends, half the way to each, and an eighth of it; or the other choices."""
+    one = Searched("x", None, over, whole, ())
+    assert near({} if own is None else {"x": own}, one) == values
+    if own == 0.2:
+        assert [*corners([one], np.random.default_rng(1))] == [{"x": x} for x in (0, 0.5, 1)]
 
 
 @given(st.floats(0, 1), st.floats(0, 1))
