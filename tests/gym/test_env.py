@@ -130,6 +130,8 @@ def test_an_episode_ends_with_its_time_and_joints_move_as_told() -> None:
         with pytest.raises(ResetNeeded):
             env.step(np.zeros(8))
         first, _ = env.reset(seed=1)
+        at, told = first["observation"][:7], first["observation"][18:25]
+        np.testing.assert_allclose(told, at, atol=0.01)
         for wrong in (np.zeros(7), np.full(8, np.nan)):
             with pytest.raises(InvalidAction):
                 env.step(wrong)

@@ -132,6 +132,9 @@ def test_without_a_good_direction_two_differ_and_nobody_is_ahead() -> None:
     assert one(sides, "landing_x").verdict == "different"
     assert one(sides, "landing_x", references={"landing_x": 1.367}).winner == "close"
     assert one(sides, "landing_x", references={"landing_x": 1.2}).winner == "off"
+    good = replace(MOVED, better="higher")  # a direction counts, also beside a reference
+    sides = planted({"a": more, "b": fewer}, "moved")
+    assert one(sides, "moved", [good], references={"moved": 0.0}).winner == "a"
 
 
 @pytest.mark.parametrize(("n", "needs"), [(2, 6), (4, 6), (5, 6), (6, 0)])

@@ -81,6 +81,7 @@ def test_the_hand_goes_where_the_real_one_went(case: Case, runs: ArmRuns) -> Non
         record = performed(case, task, number)
         assert record.details["joint_error"] < 0.002  # rad: the drives do what they are told
         assert record.settings["task.half"] == "held_out"
+        assert record.seconds["plan"] > 0.0
         return record
 
     given = followed(ArmFollowing(runs, most=2), 1)  # seeds 10001 and 10002
