@@ -25,8 +25,8 @@ difference may be the machine's noise."""
 
 SLOWER = 4.0
 """Times as long as today's settings a repetition may take before it is ended: cheaper ones
-are looked for, and a busy machine takes twice as long. (With 10 times one candidate of PyBullet
-took 7 of 36 minutes.)"""
+are looked for, and a busy machine takes twice as long. (With 10 times one candidate took 7
+of 36 minutes.)"""
 
 SHORTEST = 30.0
 """Of such a time-out [s]: what starting a worker takes is no fault of the settings."""

@@ -115,9 +115,11 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def run(words: str, landed: float = 0.5, cut: int = 99) -> str:
     """What was printed, the exit code, the badge, and JUnit's messages and properties."""
     said = io.StringIO()
-    plain = "--sim=mujoco -q --tb=no -rN -n0 --color=no --junitxml=j.xml --sim-badge=b.json"
+    plain = "--sim=mujoco -q --tb=no -rN -n0 -p no:warnings --color=no --sim-badge=b.json"
     with redirect_stdout(said), redirect_stderr(said):
-        code = pytest.main([*plain.split(), *words.split()], plugins=[Runs(landed, cut)])
+        code = pytest.main(
+            [*plain.split(), "--junitxml=j.xml", *words.split()], plugins=[Runs(landed, cut)]
+        )
     told = [f"$ pytest {words}", PYTESTS.sub("", said.getvalue()), f"exit code {int(code)}"]
     told += [Path("b.json").read_text()] if Path("b.json").exists() else []
     for case in ElementTree.parse("j.xml").iter("testcase"):
@@ -125,7 +127,8 @@ def run(words: str, landed: float = 0.5, cut: int = 99) -> str:
         lost = [(e.get("message") or "").partition("\n")[0] for e in case if e.get("message")]
         lost += [f"text: {e.text}" for e in case if "Failed: " in (e.get("message") or "")]
         told += [f"{case.get('name')}: {', '.join([*lost, *properties])}"]
-    return "\n".join([*told, ""]).replace(f"{Path.cwd()}/", "DIR/")
+    text = "\n".join([*told, ""]).replace(f"{Path.cwd()}/", "DIR/")
+    return re.sub(r"\n  (?=\S)", " ", text)  # where lines break the folder's length decides
 
 
 def test_what_each_test_says() -> None:
