@@ -45,7 +45,7 @@ class Launch:
         """The log's last lines; nothing if there is no log, or no longer."""
         if self.log is not None and self.log.is_file():
             with contextlib.suppress(OSError):
-                lines = _end(self.log, TAIL_BYTES).decode(errors="replace").splitlines()
+                lines = _end(self.log, TAIL_BYTES).decode("utf-8", "replace").splitlines()
                 return "\n".join(lines[-TAIL_LINES:])
         return ""
 

@@ -138,7 +138,7 @@ def _ask(url: str) -> str:
     try:
         request = urllib.request.Request(url, headers=headers)
         with urllib.request.urlopen(request, timeout=TIMEOUT) as answer:
-            return str(answer.read().decode())
+            return str(answer.read().decode("utf-8"))
     except urllib.error.HTTPError as error:
         if error.code != 404:
             raise

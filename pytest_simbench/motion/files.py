@@ -184,7 +184,9 @@ class _Reader:
         columns = [table.each(key, n, least=SMALLEST) for key in ("stiffness", "damping")]
         effort = table.each("effort", n, self._of_urdf("effort", names), least=SMALLEST)
         armature = table.each("armature", n, panda.ARMATURE, least=0.0)
-        return tuple(map(Joint, names, *columns, effort, armature, start))
+        return tuple(
+            Joint(*values) for values in zip(names, *columns, effort, armature, start, strict=True)
+        )
 
     def _check_mimics(self, fingers: Collection[str]) -> None:
         """Fingers alone follow each other, and move alike."""
