@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -119,22 +120,32 @@ ENGINE_ROOMS = {"sims", "testing"}
 
 SLOW = {
     "test_a_planted_loss_is_caught_and_no_change_is_not",
-    "test_equal_sides_are_told_apart_in_one_of_twenty_runs",
-    "test_error_rates",
+    "test_equal_sides_are_told_apart_in_one_of_twenty_runs", "test_error_rates",
     "test_false_alarms_of_yes_and_no_stay_below_one_in_twenty",
     "test_false_alarms_stay_below_one_in_twenty_even_without_a_margin",
-    "test_it_lands_elsewhere_if_asked_to",
-    "test_other_seeds_and_many_tests_do_not_hide_crashes",
-    "test_pictures_stay_in_their_folder",
-    "test_planted_changes_are_found_where_they_are",
-    "test_planted_values_are_found_and_intervals_cover",
-    "test_shrinks_to_the_smallest_amount",
+    "test_it_lands_elsewhere_if_asked_to", "test_other_seeds_and_many_tests_do_not_hide_crashes",
+    "test_pictures_stay_in_their_folder", "test_planted_changes_are_found_where_they_are",
+    "test_planted_values_are_found_and_intervals_cover", "test_shrinks_to_the_smallest_amount",
     "test_the_file_has_what_the_command_finds",
     "test_the_shares_are_of_all_places_also_of_those_never_filled",
     "test_whatever_is_in_it_nothing_else_is_raised",
     "test_without_a_change_one_row_in_twenty_has_one_at_most",
-}
+}  # fmt: skip
 """They take more than a second of CPU time each, and no engine. The quick tier leaves them out."""
+
+COSTLY = {
+    "ball_rolls", "belt_carries", "compounds_turn_by_their_moments", "every_effort_limit_counts",
+    "fresh_processes_agree", "moves_as_prescribed", "pairs_have_their_friction",
+    "planted_faults_are_seen", "reading_changes_nothing", "rounds_rest",
+    "test_a_file_of_genesis_moves_as_in_mujoco", "test_every_engine_holds_drawer_and_arm",
+    "test_gymnasiums_checker_is_content", "test_in_every_engine_a_drawer_falls",
+    "test_it_is_built_falls_and_rests_on_its_lowest_shape",
+    "test_joints_move_as_in_mujoco_but_for_the_armature",
+    "test_the_engine_tells_what_was_asked_for", "test_the_same_seed_gives_the_same_outcome",
+    "test_two_cubes_are_stacked", "window_changes_nothing", "worlds_leave_no_memory",
+}  # fmt: skip
+"""Tests and laws of the kit for which Genesis compiles 12 to 200 s: a quarter of all tests' time.
+`-m "not costly"`, as CI says, leaves them out, of Genesis alone."""
 
 ENGINE_FIXTURES = {"case", "handle", "machines", "pytester"}
 """Of tests that run MuJoCo, pytest with simulators, or a cluster of them."""
@@ -151,7 +162,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Mark what the quick tier leaves out, `pytest tests -m "not engine"`.
+    """Mark what the quick tier leaves out, `pytest tests -m "not engine"`, and what CI does.
 
     A test that needs an engine and is not known here has the mark in its file. One that has
     neither fails in the quick tier, which runs without any engine.
@@ -161,6 +172,9 @@ def pytest_itemcollected(item: pytest.Item) -> None:
     fixtures -= {"case"} if item.path.stem[5:] in UNRUN else set()
     if rooms & ENGINE_ROOMS or item.path.name == "test_browser.py" or fixtures & ENGINE_FIXTURES:
         item.add_marker("engine")
+    words = fixtures | {*re.split(r"\W+", item.name)}
+    if "genesis" in words and words & COSTLY:
+        item.add_marker("costly")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

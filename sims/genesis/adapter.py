@@ -13,7 +13,7 @@ from __future__ import annotations
 import dataclasses
 import gc
 import math
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -98,23 +98,17 @@ class Genesis(Simulator):
     """What this process has kernels for, see `compile`."""
 
     def compile(self, scene: Scene) -> None:
-        """Build and step such a world once; kernels depend on options and on the kinds of bodies.
+        """Build and step such a world once.
 
         The engine writes new machine code to disk when it is shut down, which is why that is done
         here: the worker's end leaves it no time. Nothing less will do: writing it out meanwhile
         (`dump_cache_data_to_disk`) makes kernels of later worlds crash.
         """
-        several = len(scene.free_bodies) + (scene.robot is not None) > 1  # solved by islands
-        options = dataclasses.replace(  # what is data, not code
-            self.settings, timestep=1.0, substeps=1, constraint_timeconst=1.0, impedance=(0.9, 0.95)
-        )
-        forces = scene.words & {"wrench", "link_gravity"}  # whose kernels are others
-        robot = None if scene.robot is None else scene.robot.self_collide
-        kind = (options, several, robot, bool(scene.free_bodies), forces)
+        kind = self.kind(scene)
         if kind in self.compiled:
             return
         self.load(scene)
-        if "wrench" in forces:
+        if "wrench" in scene.words:
             self.push(np.zeros((len(self._free), 6)))
         self.step()
         self.body_state()
@@ -124,6 +118,18 @@ class Genesis(Simulator):
         self.close()
         genesis.destroy()
         self.compiled.add(kind)
+
+    def kind(self, scene: Scene) -> tuple[Hashable, ...]:
+        """What decides which kernels a world needs: options, and kinds of bodies, not how many."""
+        options = dataclasses.replace(  # what is data, not code
+            self.settings, timestep=1.0, substeps=1, constraint_timeconst=1.0, impedance=(0.9, 0.95)
+        )
+        robot = None if scene.robot is None else scene.robot.self_collide
+        forces = scene.words & {"wrench", "link_gravity"}  # whose kernels are others
+        shapes = frozenset(type(part) for body in scene.bodies for part in body.parts)
+        grouped = any(len(body.parts) > 1 for body in scene.bodies)
+        several = len(scene.free_bodies) + (scene.robot is not None) > 1  # solved by islands
+        return options, robot, forces, shapes, grouped, several, bool(scene.free_bodies)
 
     def load(self, scene: Scene) -> None:
         self.begin(scene)

@@ -35,7 +35,7 @@ def test_two_nodes_share_one_search(
     monkeypatch.chdir(tmp_path)
     Path("test_shared.py").write_text(TEST)
     words = ["tune", "test_shared.py::test_falls", "--sim", "mujoco", "--trials", "2"]
-    words += ["--settings", "timestep", "--budget", "40s", "--output"]
+    words += ["--settings", "timestep", "--seeds", "2", "--budget", "20s", "--output"]
     with Machines(tmp_path) as machines:
         machines.wait("head")
         for name in ("a", "b"):
@@ -51,5 +51,5 @@ def test_two_nodes_share_one_search(
         chosen = [r for r in lines if "held_out" not in r["variant"]]
         assert folder == "here" or {r["host"]["node"] for r in chosen} == {"a", "b"}
         found.append({(r["variant"], r["seed"]): r["metrics"] for r in chosen})
-        assert len(found[-1]) == len(chosen) >= 8  # each is there once
+        assert len(found[-1]) == len(chosen) >= 4  # each is there once
     assert found[0] == found[1]

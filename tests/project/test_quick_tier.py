@@ -9,16 +9,19 @@ from typing import Any
 import pytest
 import yaml
 
+from pytest_simbench.testing import CHECKS
 from tests import conftest
 
 ROOT = Path(__file__).resolve().parents[2]
 CI = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text("utf-8"))
 
 
-def marks(file: str, *fixtures: str) -> list[str]:
+def marks(file: str, *fixtures: str, name: str = "test_it") -> list[str]:
     found: list[str] = []
     path = Path(conftest.__file__).parent / file
-    item: Any = SimpleNamespace(path=path, fixturenames=fixtures, add_marker=found.append)
+    item: Any = SimpleNamespace(
+        path=path, name=name, fixturenames=fixtures, add_marker=found.append
+    )
     conftest.pytest_itemcollected(item)
     return found
 
@@ -57,14 +60,21 @@ def test_ci_runs_it_on_each_python_and_pytest_with_no_simulator() -> None:
 
 
 def test_ci_still_runs_everything() -> None:
+    """But what Genesis compiles long for."""
     commands = [step.get("run", "") for step in CI["jobs"]["engines"]["steps"]]
     assert [command for command in commands if "bash .ci/run" in command]
+    assert 'pytest tests -n 2 --dist loadgroup -m "not costly"\n' in (ROOT / ".ci/run").read_text()
+    for engine, left_out in (("genesis", ["costly"]), ("newton", [])):
+        assert marks("tasks/test_it.py", name=f"test_it[{engine}-tuned-ball_rolls]") == left_out
+        assert marks("tasks/test_it.py", name=f"test_it[{engine}-tuned-free_fall]") == []
+    assert marks("tasks/test_it.py", "genesis", name="test_two_cubes_are_stacked") == ["costly"]
 
 
 def test_what_is_slow_is_left_out_and_its_names_are_those_of_tests() -> None:
     sources = [path.read_text("utf-8") for path in (ROOT / "tests").glob("*/test_*.py")]
     gone = [name for name in conftest.SLOW if not any(f"def {name}(" in s for s in sources)]
-    assert gone == []
+    gone += [name for name in conftest.COSTLY if not any(f"def {name}(" in s for s in sources)]
+    assert set(gone) <= CHECKS.keys()
     left = [SimpleNamespace(name="test_fine", originalname="test_fine")]
     slow = SimpleNamespace(name="test_error_rates[0.0]", originalname="test_error_rates")
     items: Any = [*left, slow]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,8 @@ from scipy.spatial import ConvexHull
 
 from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.description.mesh_check import written_stl
-from pytest_simbench.scene import Gripper, Joint, Robot, Scene
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.scene import Box, Compound, Gripper, Joint, Pose, Robot, Scene, Sphere
 from pytest_simbench.testing import scenes
 
 from .worlds import Worlds
@@ -50,6 +52,26 @@ def test_the_worker_survives_a_bad_option(worlds: Worlds) -> None:
     with pytest.raises(EngineFailed, match="elliptic"):
         worlds.load(scenes.tower(), friction_cone="elliptic", noslip_iterations=5)
     assert worlds.load(scenes.tower()).time == 0.0
+
+
+def test_a_world_of_other_shapes_is_another_to_compile_for() -> None:
+    """Else they compile while they load, which must not take a minute."""
+    kind = Genesis(Genesis.profiles["tuned"]).kind
+    places = [Pose.at(0.2 * k, 0.0, 0.1) for k in range(4)]
+    boxes = [Box(f"b{k}", (0.1,) * 3, at, 0.1) for k, at in enumerate(places)]
+    fixed = tuple(replace(box, mass=0.0) for box in boxes[:2])
+    ball, pair = Sphere("ball", 0.1, places[3], 0.1), Compound("pair", fixed, places[2])
+    two = Scene("two", tuple(boxes[:2]))
+    assert kind(two) == kind(replace(two, name="three", bodies=tuple(boxes[:3])))
+    others = [replace(two, bodies=(*boxes[:2], other)) for other in (ball, pair)]
+    others += [
+        replace(two, bodies=()),
+        replace(two, bodies=(boxes[0],)),
+        replace(two, robot=panda()),
+    ]
+    assert len({kind(scene) for scene in (two, *others)}) == 1 + len(others)
+    finer = replace(Genesis.profiles["tuned"], timestep=1e-4)
+    assert Genesis(finer).kind(two) == kind(two)
 
 
 def test_hulls_of_more_than_500_faces_are_kept_whole(worlds: Worlds, tmp_path: Path) -> None:
