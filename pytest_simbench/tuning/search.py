@@ -7,6 +7,7 @@ trials again; what is recorded it does not repeat, and then goes on as it would 
 from __future__ import annotations
 
 import json
+import math
 import time
 import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -27,9 +28,6 @@ STARTUP = 10
 
 IDLE = 100
 """Trials in a row that bring only what was looked at, after which a search ends."""
-
-FEWEST = 3
-"""Candidates that a budget must be enough for."""
 
 
 def space_of(base: Settings, names: Sequence[str] | None, simulator: str) -> tuple[Searched, ...]:
@@ -92,15 +90,8 @@ class Search:
         """
         library = optuna()
         began = time.monotonic()
-        today = self.trials.today()
+        today = self.trials.today(seconds if most is None else math.inf)
         self.done = [today]
-        took = sum(record.cost("total") or 0.0 for record in today.records.values())
-        took /= self.trials.runs.executor.jobs  # they were had at once
-        if seconds < FEWEST * took and most is None:
-            raise TuningError(
-                f"{seconds:.0f} s are too few to search: today's settings alone took {took:.0f} s; "
-                f"give a budget of at least {1 + 4 * took / 60:.0f}min for each simulator"
-            )
         study = self._study(library)
         known, number, latest = {self._key({}): today}, 0, 0
         while number != most and number - latest < IDLE:

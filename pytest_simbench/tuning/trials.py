@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -30,6 +31,10 @@ of 36 minutes.)"""
 
 SHORTEST = 30.0
 """Of such a time-out [s]: what starting a worker takes is no fault of the settings."""
+
+
+FEWEST = 3
+"""Candidates that a budget must be enough for."""
 
 
 @dataclass(eq=False)
@@ -134,23 +139,32 @@ class Trials:
     timeout: float | None = None
     _first: dict[tuple[str, Look], Record] = field(default_factory=dict)
 
-    def today(self) -> Candidate:
-        """The settings that the search began with; the time-outs of the others follow.
+    def today(self, seconds: float = math.inf) -> Candidate:
+        """The settings that the search of so many `seconds` began with; the time-outs of the others
+        follow.
 
         Raises:
-            TuningError: no repetition has a cost and an error.
+            TuningError: no repetition has a cost and an error, or there is too little time, which
+                is said as soon as it is known.
         """
-        found = Candidate("today", {})
+        found, looks = Candidate("today", {}), self.target.chosen
         for one in (*self._finer(""), found):
-            for _ in self._looks(one, self.target.chosen):
-                pass
+            for _ in self._looks(one, looks):
+                times = [record.cost("total") or 0.0 for record in found.records.values()]
+                jobs = self.runs.executor.jobs  # so many were had at once
+                if seconds < FEWEST * sum(times) / jobs:
+                    whole = len(looks) * sum(times) / len(times) / jobs
+                    raise TuningError(
+                        f"{seconds:.0f} s are too few to search: today's settings alone take "
+                        f"{whole:.0f} s; give a budget of at least {1 + 4 * whole / 60:.0f}min for "
+                        "each simulator"
+                    )
             if not (one.costs and one.errors):
                 record = next(iter(one.records.values()))
                 why = record.error.message if record.error else "none has a cost and an error"
                 what = "today's settings" if one is found else f"{FINER} times as many steps"
                 raise TuningError(f"{what} cannot be judged: {why:.300}")
-        took = [record.cost("total") or 0.0 for record in found.records.values()]
-        self.timeout = float(max(SHORTEST, round(SLOWER * max(took))))
+        self.timeout = float(max(SHORTEST, round(SLOWER * max(times))))
         return found
 
     def choose(self, name: str, changes: Mapping[str, Any], done: Sequence[Candidate]) -> Candidate:

@@ -119,8 +119,9 @@ def test_too_little_time(tmp_path: Path, jobs: int, took: int) -> None:
     pytest.importorskip("optuna")
     one, executor = search(tmp_path)
     executor.jobs = jobs
-    with pytest.raises(TuningError, match=f"2 s are too few .* took {took} s; .* for each sim"):
+    with pytest.raises(TuningError, match=f"2 s are too few .* take {took} s; .* for each sim"):
         one.run(2.0)
+    assert len(executor.asked) < 4  # of 1 s each
 
 
 def test_without_optuna(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
