@@ -16,6 +16,7 @@ import shutil
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from os import environ
@@ -23,7 +24,6 @@ from pathlib import Path
 
 from pytest_simbench import __version__
 from pytest_simbench.client.environments import existing, missing, outside
-from pytest_simbench.data.download import digest
 from pytest_simbench.ground.versions import RELEASE, VersionedName
 from pytest_simbench.simulator import SimulatorError
 from pytest_simbench.simulator.info import SimulatorInfo
@@ -37,6 +37,8 @@ BESIDE = {"sims", "suites"}  # in a checkout; in the package where that is insta
 
 def _code() -> str:
     """Ten digits of all modules of this package and of the adapters: commits share a version."""
+    from pytest_simbench.data.download import digest
+
     files = {}
     for package in ("pytest_simbench", "pytest_simbench.sims"):
         folder = Path(getattr(find_spec(package), "origin", None) or __file__).parent
@@ -47,7 +49,10 @@ def _code() -> str:
     return digest(files)[:10]
 
 
-PLUGIN = f"{SLOTS}=={__version__}+{_code()}"
+@cache
+def plugin() -> str:
+    """This package."""
+    return f"{SLOTS}=={__version__}+{_code()}"
 
 
 def here(slots: int, names: Iterable[str] | None = None) -> dict[str, float]:
@@ -58,7 +63,7 @@ def here(slots: int, names: Iterable[str] | None = None) -> dict[str, float]:
         names: simulators to offer; None for all that are ready here, and their releases in
             environments of their own.
     """
-    found = [SLOTS, PLUGIN, PYTHON]
+    found = [SLOTS, plugin(), PYTHON]
     for name in (*registered(), *_releases()) if names is None else names:
         info = adapter(name).info
         if not (lacks := missing(info)):
@@ -114,7 +119,7 @@ class Node:
     @property
     def stranger(self) -> str:
         """Why nothing can be carried out there, in words, or nothing."""
-        for what, offer in (("pytest-simbench", PLUGIN), ("Python", PYTHON)):
+        for what, offer in (("pytest-simbench", plugin()), ("Python", PYTHON)):
             name, _, ours = offer.partition(RELEASE)
             if self.versions.get(name) != ours:
                 return f"runs {what} {self.versions.get(name)}, and this is {ours}"

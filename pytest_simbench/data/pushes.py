@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pytest_simbench.data.measured import DataError, Half, Measured, MeasuredMotion, read_motions
 from pytest_simbench.records.paths import whole, write_whole
@@ -177,6 +176,8 @@ def convert(files: Mapping[str, bytes], folder: Path) -> None:
 
 def _table(content: bytes, path: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Time, hand and cube of a run's table."""
+    from scipy.spatial.transform import Rotation  # 0.2 s, and only a download asks
+
     try:
         rows = [line.split() for line in content.decode("ascii").splitlines()]
         numbers = np.array(rows, float)

@@ -17,7 +17,6 @@ import pytest
 from pytest_simbench.cli import runs
 from pytest_simbench.cli.runs import RUNS
 from pytest_simbench.client.display import Displays
-from pytest_simbench.cluster.executor import ClusterExecutor
 from pytest_simbench.experiment.executor import Executor, LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.resumed import NotResumed, Resumed, run_to_resume
@@ -146,6 +145,8 @@ class Run:
     def executor(self) -> Executor:
         """Where repetitions are carried out."""
         if cluster.asked(self.config):
+            from pytest_simbench.cluster.executor import ClusterExecutor
+
             return ClusterExecutor(cluster.pool(self.config), self.tell)
         jobs = options.value(self.config, "sim_jobs")
         slots = (self._shared_by or {}).get("simbench_slots", "")

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from pytest_simbench.cluster import offers
-from pytest_simbench.cluster.offers import PLUGIN, PYTHON
+from pytest_simbench.cluster.offers import PYTHON, plugin
 from pytest_simbench.simulator import SimulatorError
 
 OUTSIDE = {
@@ -39,7 +39,7 @@ def bare(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> pytest.MonkeyPatch:
 
 def offered(*names: str) -> set[str]:
     """What there is besides what every node offers."""
-    return {*offers.here(1, names)} - {"simbench", PLUGIN, PYTHON}
+    return {*offers.here(1, names)} - {"simbench", plugin(), PYTHON}
 
 
 def test_simulators_are_offered_by_name_and_version(
@@ -50,7 +50,7 @@ def test_simulators_are_offered_by_name_and_version(
     assert offered("pybullet", "sapien") == {"pybullet==2.5", "sapien==unknown"}
     with pytest.raises(SimulatorError, match="drake cannot be offered: not here"):
         offered("drake")
-    assert offers.here(3, []) == {"simbench": 3.0, PLUGIN: 3.0, PYTHON: 3.0}
+    assert offers.here(3, []) == {"simbench": 3.0, plugin(): 3.0, PYTHON: 3.0}
     found = {name for name in offers.here(1) if name.startswith(("drake", "mujoco", "nothing"))}
     assert found == {"mujoco==3.9", "mujoco==3.3.7==3.9"}
 

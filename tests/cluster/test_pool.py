@@ -16,7 +16,7 @@ from pytest_simbench.cli.main import main
 from pytest_simbench.cluster import pool as module
 from pytest_simbench.cluster import serving
 from pytest_simbench.cluster.executor import ClusterExecutor
-from pytest_simbench.cluster.offers import PLUGIN, PYTHON, Node, here, refusal, unmet
+from pytest_simbench.cluster.offers import PYTHON, Node, here, plugin, refusal, unmet
 from pytest_simbench.cluster.pool import TLS, Pool, reason
 from pytest_simbench.cluster.serving import not_taken
 from pytest_simbench.experiment.case import Case
@@ -24,6 +24,8 @@ from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.simulator.registry import adapter
 from tests.cluster.machines import release_in
 from tests.tiny import Falling
+
+PLUGIN = plugin()
 
 
 def node(name: str, *offers: str, slots: int = 1) -> Node:
