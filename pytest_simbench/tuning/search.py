@@ -148,8 +148,9 @@ class Search:
         own = own_values(self.space, self.base).get(one.name)  # 1/240 as it is
         if own is not None and f"{own:.4g}" == value:
             return own
-        period = self.trials.target.period if one.name == "timestep" else 0.0
-        return period / max(1, round(period / float(value))) or float(value)
+        if one.name == "timestep" and (period := self.trials.target.period):
+            return period / max(1, round(period / float(value)))
+        return float(value)
 
     def _first(self) -> list[dict[str, Any]]:
         """Today's values, and each with one changed: half-way to either end of its range on its

@@ -114,6 +114,14 @@ def test_a_setting_that_does_not_act_is_not_asked_for(tmp_path: Path) -> None:
         assert ("stiction_tolerance" in asked) == (asked["approximation"] != "sap")
 
 
+def test_a_range_may_begin_at_zero(tmp_path: Path) -> None:
+    optuna = pytest.importorskip("optuna")
+    base = adapter("drake").profiles["tuned"]
+    (at,) = space_of(base, ["relaxation_time"], "drake")
+    one = Search(trials(tmp_path, score)[0], base, [at], 1, lambda one, best: None)
+    assert one._one(optuna.trial.FixedTrial({at.name: 0.0}), at) == 0.0 == at.over.low
+
+
 @pytest.mark.parametrize(("jobs", "took"), [(1, 4), (4, 1)])
 def test_too_little_time(tmp_path: Path, jobs: int, took: int) -> None:
     pytest.importorskip("optuna")
