@@ -117,7 +117,7 @@ def test_a_setting_that_does_not_act_is_not_asked_for(tmp_path: Path) -> None:
 def test_a_range_may_begin_at_zero(tmp_path: Path) -> None:
     optuna = pytest.importorskip("optuna")
     base = adapter("drake").profiles["tuned"]
-    (at,) = space_of(base, ["relaxation_time"], "drake")
+    (at,) = space_of(base, ["near_rigid_threshold"], "drake")
     one = Search(trials(tmp_path, score)[0], base, [at], 1, lambda one, best: None)
     assert one._one(optuna.trial.FixedTrial({at.name: 0.0}), at) == 0.0 == at.over.low
 
