@@ -140,8 +140,7 @@ def _mesh_points(path: str, _changed: int) -> FloatArray:
     points = np.empty(0) if reader is None else reader(Path(path).read_bytes())
     if not len(points):
         raise DescriptionError(f"{path} is no STL or OBJ file: collision meshes must be one")
-    corners = points.reshape(-1, 3)[np.lexsort(points.reshape(-1, 3).T[::-1])]
-    return np.asarray(corners[np.append(True, (corners[1:] != corners[:-1]).any(axis=1))])
+    return np.unique(points.reshape(-1, 3), axis=0)
 
 
 def _read_obj(data: bytes) -> FloatArray:

@@ -32,7 +32,6 @@ of 36 minutes.)"""
 SHORTEST = 30.0
 """Of such a time-out [s]: what starting a worker takes is no fault of the settings."""
 
-
 FEWEST = 3
 """Candidates that a budget must be enough for."""
 

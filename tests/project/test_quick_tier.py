@@ -59,8 +59,7 @@ def test_ci_runs_it_on_each_python_and_pytest_with_no_simulator() -> None:
     assert [command for command in commands if "[all" in command] == []
 
 
-def test_ci_still_runs_everything() -> None:
-    """But what Genesis compiles long for."""
+def test_ci_runs_everything_but_what_genesis_compiles_long_for() -> None:
     commands = [step.get("run", "") for step in CI["jobs"]["engines"]["steps"]]
     assert [command for command in commands if "bash .ci/run" in command]
     assert 'pytest tests -n 2 --dist loadgroup -m "not costly"\n' in (ROOT / ".ci/run").read_text()
