@@ -107,8 +107,8 @@ def shape_points(shape: Shape) -> FloatArray:
 
 
 def own_points(shape: Shape) -> FloatArray:
-    """The same in its own frame."""
-    return box_corners(shape.size) if shape.size else mesh_points(shape.mesh or "")
+    """The same in its own frame; a corner of a mesh as often as triangles have it."""
+    return box_corners(shape.size) if shape.size else _corners(shape.mesh or "")
 
 
 def write_obj(path: Path, mesh: Polytope) -> Path:
@@ -131,16 +131,20 @@ def mesh_points(path: str) -> FloatArray:
     Raises:
         DescriptionError: the file is neither binary STL nor OBJ.
     """
-    return _mesh_points(path, Path(path).stat().st_mtime_ns)
+    return np.asarray(np.unique(_corners(path), axis=0))
+
+
+def _corners(path: str) -> FloatArray:
+    return _read_corners(path, Path(path).stat().st_mtime_ns)
 
 
 @lru_cache(maxsize=64)
-def _mesh_points(path: str, _changed: int) -> FloatArray:
+def _read_corners(path: str, _changed: int) -> FloatArray:
     reader = {".stl": read_stl, ".obj": _read_obj}.get(Path(path).suffix.lower())
     points = np.empty(0) if reader is None else reader(Path(path).read_bytes())
     if not len(points):
         raise DescriptionError(f"{path} is no STL or OBJ file: collision meshes must be one")
-    return np.unique(points.reshape(-1, 3), axis=0)
+    return points.reshape(-1, 3)
 
 
 def _read_obj(data: bytes) -> FloatArray:

@@ -156,8 +156,8 @@ def one_value(values: Any) -> Any:
 
     Where they differ: all of them, as an array (n,), which no scene asks for.
     """
-    different = np.unique(values)
-    return different[0] if len(different) == 1 else different
+    values = np.ravel(values)
+    return values[0] if values.size and (values == values[0]).all() else np.unique(values)
 
 
 @contextmanager

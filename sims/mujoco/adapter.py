@@ -26,7 +26,7 @@ from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from .reading import Reading
 from .settings import CHOSEN_ON, PROFILES, FileSettings, MuJoCoSettings
-from .world import MOST, build, gain, leave_out, shape_label
+from .world import build, gain, leave_out, shape_label
 
 mujoco = lazy_import("mujoco")
 
@@ -141,8 +141,8 @@ class MuJoCo(Simulator):
         )
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
-        asked = self._share * position + (self._damping * velocity + effort) / self._gain
-        self.data.ctrl[:] = asked.clip(-MOST, MOST)
+        feed_forward = (self._damping * velocity + effort) / self._gain
+        self.data.ctrl[:] = self._share * position + feed_forward
 
     def push(self, wrenches: FloatArray) -> None:
         self.data.xfrc_applied[self._body_ids] = wrenches

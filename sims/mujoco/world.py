@@ -200,6 +200,8 @@ def _add_drive(spec: Any, joint: Joint) -> None:
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         forcelimited=True,
         forcerange=[-joint.effort_limit, joint.effort_limit],
+        ctrllimited=True,
+        ctrlrange=[-MOST, MOST],
     )
     drive.gainprm[0] = gain(joint.stiffness)
     drive.biasprm[1], drive.biasprm[2] = -joint.stiffness, -joint.damping
