@@ -102,13 +102,10 @@ def placed(points: FloatArray, pose: Pose) -> FloatArray:
 
 
 def shape_points(shape: Shape) -> FloatArray:
-    """Corners of a box or a mesh in the frame of its link, (n, 3) [m]."""
-    return placed(own_points(shape), shape.pose)
-
-
-def own_points(shape: Shape) -> FloatArray:
-    """The same in its own frame; a corner of a mesh as often as triangles have it."""
-    return box_corners(shape.size) if shape.size else _corners(shape.mesh or "")
+    """Corners of a box or a mesh in the frame of its link, (n, 3) [m]; one of a mesh as often as
+    triangles have it."""
+    points = box_corners(shape.size) if shape.size else _corners(shape.mesh or "")
+    return placed(points, shape.pose)
 
 
 def write_obj(path: Path, mesh: Polytope) -> Path:

@@ -14,7 +14,7 @@ from pytest_simbench.description.carried import APPROXIMATED, CARRIED, NOT_CARRI
 from pytest_simbench.description.links import link_poses
 from pytest_simbench.description.mesh_check import FARTHEST, PACKAGE, written_stl
 from pytest_simbench.description.robot_files import content, keep, keep_mesh
-from pytest_simbench.description.shapes import capsule_hull, cylinder_hull, own_points
+from pytest_simbench.description.shapes import capsule_hull, cylinder_hull, placed, shape_points
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.description.urdf_check import MOVING, Description, read_xml
 from pytest_simbench.ground.errors import DescriptionError
@@ -243,10 +243,9 @@ def _lowest(robot: Robot) -> float:
     poses = link_poses(prepared)
     return min(
         (
-            float((own_points(shape) @ pose.rotation().T)[:, 2].min() + pose.position[2])
+            float(placed(shape_points(shape), poses[name])[:, 2].min())
             for name, link in prepared.links.items()
             for shape in link.shapes
-            for pose in (poses[name] * shape.pose,)
         ),
         default=0.0,
     )

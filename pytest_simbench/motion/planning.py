@@ -16,14 +16,13 @@ from itertools import pairwise
 import numpy as np
 from ompl import base, geometric, util
 
-from pytest_simbench.description.robot_files import robot_cache
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.kinematics import DECIMALS, straight_line, tool_path
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.throw import Throw, feasible_swing, released
 from pytest_simbench.motion.timing import TICK, Timed, along_path, straight_move, synchronised_move
-from pytest_simbench.scene import Body, FloatArray, Pose, Robot, Trajectory
+from pytest_simbench.scene import FloatArray, Pose, Trajectory
 
 CHECK_SPACING = 0.02
 """Farthest that the hand moves between two collision checks [m]. The planning scene's margin is
@@ -177,13 +176,8 @@ class MotionPlanner:
         Args:
             feasible: within the limits of the motors; else as the reference study swings.
         """
-        held = self.scene.held_body
         timed, duration = (
-            _feasible_swing(
-                self.model.robot,
-                *map(tuple, (start, goal, self.gravity)),
-                held=held and held.moved_to(Pose()),
-            )
+            feasible_swing(self.model, start, goal, self.gravity, self.scene.held_body)
             if feasible
             else synchronised_move(start, goal, self.limits)
         )
@@ -276,11 +270,3 @@ class MotionPlanner:
         wanted = np.arange(0.0, travelled[-1], self._spacing)
         picked = np.unique(np.searchsorted(travelled, wanted))
         return np.vstack([rows[picked], rows[-1:]])
-
-
-@robot_cache
-def _feasible_swing(robot: Robot, *of: tuple[float, ...], held: Body | None) -> tuple[Timed, float]:
-    """By start, goal and gravity, once for all repetitions: it takes as long as the rest of a
-    throw's planning."""
-    start, goal, gravity = map(np.array, of)
-    return feasible_swing(RobotModel(robot), start, goal, gravity, held)

@@ -141,8 +141,8 @@ class MuJoCo(Simulator):
         )
 
     def command(self, position: FloatArray, velocity: FloatArray, effort: FloatArray) -> None:
-        feed_forward = (self._damping * velocity + effort) / self._gain
-        self.data.ctrl[:] = self._share * position + feed_forward
+        ahead = (self._damping * velocity + effort) / self._gain
+        self.data.ctrl[:] = self._share * position + ahead
 
     def push(self, wrenches: FloatArray) -> None:
         self.data.xfrc_applied[self._body_ids] = wrenches

@@ -215,8 +215,7 @@ def _add_drive(spec: Any, joint: Joint) -> None:
 
 
 def gain(stiffness: Any) -> Any:
-    """Of a drive's actuator, here and in Newton: effort for 1 of its control. At least 1, so that
-    `MOST` is out of the way."""
+    """Effort for 1 of a drive's control, here and in Newton; at least 1: `MOST` is far away."""
     return np.maximum(stiffness, 1.0)
 
 
