@@ -60,8 +60,7 @@ patch = _exit
 
 
 class Fault(NamedTuple):
-    """A place in a function, changed: the file (below `ROOT`), which of its places, where, the
-    lines before and after, and the whole file with it."""
+    """A changed place: file below `ROOT`, number, line, the change, and the whole file with it."""
 
     file: str
     place: int
@@ -121,8 +120,7 @@ def plain(test: str) -> str:
 
 
 def learn(arguments: Sequence[str], side_by_side: str) -> None:
-    """Run the tests once, and note which reaches which line and how long each takes. One that fails
-    without a fault is not asked."""
+    """Run the tests once: which reaches which line, how long each takes. Who fails is not asked."""
     KEPT.mkdir(exist_ok=True)
     for old in KEPT.glob("coverage*"):
         old.unlink()
@@ -189,17 +187,19 @@ class Asking:
         return True
 
     def tests(self, fault: Fault, items: dict[str, Any]) -> list[str]:
-        """The tests to ask; of a line within a statement, those that reach the statement."""
+        """The tests to ask: those that reach the line, or the statement that it is in, and those of
+        the file, which may know what ran while it was imported."""
         every, lines = list(self.seconds), self.reach.get(fault.file, {})
         there = next((lines[str(n)] for n in range(fault.line, 0, -1) if str(n) in lines), [])
-        home = f"tests/{fault.file.split('/')[1]}/"
+        top, *rooms, name = fault.file.removesuffix(".py").split("/")
+        home, name = ("sims", rooms[0]) if top == "sims" else ("/".join(rooms), name)
+        own = [n for n, t in enumerate(every) if t.startswith(f"tests/{home}/test_{name}")]
 
         def length(test: str) -> float:
-            return self.seconds[test] * (AT_HOME if test.startswith(home) else 1.0)
+            return self.seconds[test] * (AT_HOME if test.startswith(f"tests/{home}") else 1.0)
 
-        chosen: list[str] = []
-        total = 0.0
-        for test in sorted((every[n] for n in there if every[n] in items), key=length):
+        chosen, total = list[str](), 0.0
+        for test in sorted({every[n] for n in [*there, *own] if every[n] in items}, key=length):
             total += self.seconds[test]
             if chosen and total > MOST:
                 break
