@@ -181,9 +181,8 @@ class Asking:
             answer = {**fault._asdict(), "source": None, "asked": len(tests), "noticed": seen}
             with self.answers.open("a") as file:
                 file.write(json.dumps(answer) + "\n")
-            print(f"\n{fault.file}:{fault.line}: {seen or 'NOT NOTICED'} ({len(tests)} tests)")
-            if not seen:
-                print(fault.change)
+            told = seen or f"NOT NOTICED\n{fault.change}"
+            print(f"\n{fault.file}:{fault.line}, {len(tests)} tests: {told}")
         return True
 
     def tests(self, fault: Fault, items: dict[str, Any]) -> list[str]:

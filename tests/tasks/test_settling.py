@@ -42,7 +42,8 @@ def test_the_deepest_overlap_is_that_of_bodies_or_of_the_ground() -> None:
     assert deepest(SCENE, lower) == pytest.approx(0.003)
     sunk = ends | {"slab": SLAB.moved_to(Pose.at(0, 0, 0.045))}
     assert deepest(SCENE, sunk) == pytest.approx(0.005)
-    assert deepest(replace(SCENE, apart=(("ground", "body/slab"),)), sunk) == 0.0
+    apart = replace(SCENE, apart=(("ground", "body/slab"), ("body/slab", "body/stool")))
+    assert deepest(apart, sunk) == deepest(apart, lower) == 0.0
 
 
 def test_starts_are_moved_on_request_alone_and_by_the_seed() -> None:
