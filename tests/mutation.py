@@ -195,7 +195,7 @@ class Asking:
         own = [n for n, t in enumerate(every) if t.startswith(f"tests/{home}/test_{name}")]
 
         def length(test: str) -> float:
-            return self.seconds[test] * (AT_HOME if test.startswith(f"tests/{home}") else 1.0)
+            return self.seconds[test] * (AT_HOME if test.startswith(f"tests/{home}/") else 1.0)
 
         chosen, total = list[str](), 0.0
         for test in sorted({every[n] for n in [*there, *own] if every[n] in items}, key=length):

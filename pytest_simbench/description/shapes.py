@@ -102,9 +102,8 @@ def placed(points: FloatArray, pose: Pose) -> FloatArray:
 
 
 def shape_points(shape: Shape) -> FloatArray:
-    """Corners of a box or a mesh in the frame of its link, (n, 3) [m]; one of a mesh as often as
-    triangles have it."""
-    points = box_corners(shape.size) if shape.size else _corners(shape.mesh or "")
+    """Corners of a box or a mesh (`mesh_corners`) in the frame of its link, (n, 3) [m]."""
+    points = box_corners(shape.size) if shape.size else mesh_corners(shape.mesh or "")
     return placed(points, shape.pose)
 
 
@@ -123,15 +122,16 @@ def write_stl(path: Path, mesh: Polytope) -> Path:
 
 
 def mesh_points(path: str) -> FloatArray:
-    """The distinct corners of a mesh, (n, 3) [m].
+    """The distinct corners of a mesh, (n, 3) [m]; errors as `mesh_corners`."""
+    return np.asarray(np.unique(mesh_corners(path), axis=0))
+
+
+def mesh_corners(path: str) -> FloatArray:
+    """The corners of a mesh, each as often as triangles have it, (n, 3) [m].
 
     Raises:
         DescriptionError: the file is neither binary STL nor OBJ.
     """
-    return np.asarray(np.unique(_corners(path), axis=0))
-
-
-def _corners(path: str) -> FloatArray:
     return _read_corners(path, Path(path).stat().st_mtime_ns)
 
 

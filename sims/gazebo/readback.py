@@ -24,7 +24,7 @@ from pytest_simbench.description.shapes import (
     a_cylinder,
     a_mesh,
     a_round,
-    mesh_points,
+    mesh_corners,
 )
 from pytest_simbench.description.urdf import pose_of_rpy
 from pytest_simbench.parity import readback
@@ -204,7 +204,7 @@ def _points(mesh: ET.Element) -> FloatArray:
     uri, scale = mesh.find("uri"), mesh.find("scale")
     assert uri is not None
     path = unquote(urlparse((uri.text or "").strip()).path)
-    return np.asarray(mesh_points(path) * (1.0 if scale is None else numbers(scale)))
+    return np.asarray(mesh_corners(path) * (1.0 if scale is None else numbers(scale)))
 
 
 def _motion(joint: ET.Element, axis: ET.Element) -> FloatArray:
