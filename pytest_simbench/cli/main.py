@@ -119,9 +119,10 @@ COMMANDS = (
     Subcommand("tune", "cli.tune:tune", "search settings that give this truth for the least cost",
             "It searches for three quarters of the budget, and judges on what it did not search "
             "by. The same command goes on where it was interrupted.", (
-                Argument("target", read.file, "TARGET", "a test, FILE.py::TEST; laws:NAME,... "
-                         "(laws or phenomena); stacking, throwing or pushing; or measured data: "
-                         "tosses, impacts, pushes, commands"),
+                Argument("target", read.file, "TARGET", "a test, FILE.py::TEST; laws, or "
+                         "laws:NAME,... (laws or phenomena); stacking, throwing or pushing; "
+                         "measured data: tosses, impacts, pushes, commands; or several of these, "
+                         "NAME,NAME:METRIC,laws:NAME,..."),
                 Argument("--sim", read.simulators, "NAME,...", "whose settings, or all, one search "
                          "after the other; simbench list --settings NAME prints them"),
                 Argument("--profile", read.profiles, "NAME|FILE", "today's (default: tuned)"),

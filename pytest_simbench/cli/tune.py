@@ -7,7 +7,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 from pytest_simbench.cli.asked import asked
@@ -39,8 +41,8 @@ from pytest_simbench.report.files import shown
 from pytest_simbench.simulator.registry import adapter, known
 from pytest_simbench.tuning.judging import SEEDS, recommended
 from pytest_simbench.tuning.search import Search, finished, folder_name, front, space_of
+from pytest_simbench.tuning.several import named
 from pytest_simbench.tuning.target import FINER
-from pytest_simbench.tuning.target import target as target_of
 from pytest_simbench.tuning.trials import Candidate, Trials
 
 SEARCHING = 0.75
@@ -145,7 +147,7 @@ def _search(
         of_test, note = (found.experiment.asked, found.claims), found.failed
         source = (Path(target.partition("::")[0]).read_bytes(),)
     can = adapter(name).info.capabilities
-    wanted = target_of(target, cost or "cpu_cost", error, seeds, SEEDS, can, of_test)
+    wanted = named(target, cost or "cpu_cost", error, seeds, SEEDS, can, of_test)
     base = chosen.settings(name, label, case.changes)
     space = space_of(base, settings, name)
     seed = 1 if seed is None else seed
@@ -188,7 +190,10 @@ def _judge(trials: Trials, today: Candidate, found: Candidate, seconds: float) -
         return []
     looks = trials.target.judged
     if not trials.target.laws:
-        took = [r.cost("total") or 0.1 for c in (today, found) for r in c.records.values()]
-        each = (2 + FINER * trials.target.converged) * sum(took) / len(took)
-        looks = looks[: max(FEWEST_JUDGED, int(seconds * trials.runs.executor.jobs / each))]
+        took: dict[str, list[float]] = {}  # by task
+        for one, record in chain(today.records.items(), found.records.items()):
+            took.setdefault(one.task.name, []).append(record.cost("total") or 0.1)
+        each = (2 + FINER * trials.target.converged) * sum(map(fmean, took.values()))
+        many = max(FEWEST_JUDGED, int(seconds * trials.runs.executor.jobs / each))
+        looks = tuple(look for look in looks if look.number < looks[0].number + many)
     return trials.judge(today, found, looks=looks)

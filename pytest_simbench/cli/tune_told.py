@@ -99,14 +99,9 @@ def verdict_of(of: Result) -> Iterator[str]:
         if not kept:
             yield "not judged: there are no other parameters of these laws, or no other starts"
         return
-    cheaper = "cost not told apart"
-    if judgement.cheaper is not None:
-        cheaper = f"cost divided by {_interval(judgement.cheaper)}"
-    worse = f" (more by {_interval(judgement.worse_by)})" if judgement.worse_by else ""
-    yield (
-        f"held-out half: {judgement.verdict}: error {significant(judgement.before)} today, "
-        f"{significant(judgement.after)} then{worse}; {judgement.reason}; {cheaper}"
-    )
+    yield f"held-out half: {_told(judgement)}"
+    for name, one in judgement.several.items():
+        yield f"  {name}: {_told(one)}"
 
 
 def together(results: Iterable[Result]) -> Iterator[str]:
@@ -124,6 +119,17 @@ def together(results: Iterable[Result]) -> Iterator[str]:
     yield from aligned(rows)
 
 
+def _told(of: Judgement) -> str:
+    if of.several:
+        return f"{of.verdict}:"
+    cheaper = f"cost divided by {_interval(of.cheaper)}" if of.cheaper else "cost not told apart"
+    worse = f" (more by {_interval(of.worse_by)})" if of.worse_by else ""
+    return (
+        f"{of.verdict}: error {significant(of.before)} today, {significant(of.after)} then{worse}; "
+        f"{of.reason}; {cheaper}"
+    )
+
+
 def _interval(of: Interval) -> str:
     return f"{significant(of.mean)} [{significant(of.low)}, {significant(of.high)}]"
 
@@ -131,20 +137,27 @@ def _interval(of: Interval) -> str:
 def profile_of(of: Result) -> str:
     """The text of the profile file."""
     target, case, found = of.trials.target, of.trials.case, of.found
-    record, task = next(iter(found.records.values())), target.chosen[0].task
-    numbers = [look.number + FIRST_CHOSEN - 1 for look in target.chosen]
     chosen: dict[str, Any] = {"by": f"simbench tune {target.name}", "reason": of.why}
     before = case.file.chosen_on if case.file else ()
     seeds = [[one.task, one.first, one.last] for one in before]
-    if target.laws:
-        chosen["laws"] = list(dict.fromkeys(look.task.name for look in target.chosen))
-    elif isinstance(task, MeasuredTask):
-        chosen["motions"] = {task.data: sorted(task.real(seed).number for seed in numbers)}
-    else:
-        seeds.append([task.name, numbers[0], numbers[-1]])
-        if target.judged:
-            chosen["judged_from"] = target.first_judged + target.judged[0].number - 1
-    chosen |= {"seeds": seeds, "versions": dict(record.versions), "commit": _commit()}
+    motions = {}
+    for part in target.parts:
+        task = part.chosen[0].task
+        numbers = [look.number + FIRST_CHOSEN - 1 for look in part.chosen]
+        if part.laws:
+            chosen["laws"] = list(dict.fromkeys(look.task.name for look in part.chosen))
+        elif isinstance(task, MeasuredTask):
+            motions[task.data] = sorted(task.real(seed).number for seed in numbers)
+        else:
+            seeds.append([task.name, numbers[0], numbers[-1]])
+            if part.judged:
+                chosen["judged_from"] = part.first_judged + part.judged[0].number - 1
+    if motions:
+        chosen["motions"] = motions
+    versions = next(iter(found.records.values())).versions
+    chosen |= {"seeds": seeds, "versions": dict(versions)}
+    if commit := _commit():
+        chosen["commit"] = commit
     changes = {**case.changes, **found.changes}
     return write_profile(case.base, base_name(case.simulator), changes, chosen)
 

@@ -4,23 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
+from dataclasses import dataclass, field
 
 from pytest_simbench.measure.intervals import Interval, betting, interval, proportion, skewed_t
 from pytest_simbench.measure.verdicts import Verdict, confidence, judge
 from pytest_simbench.records.metrics import significant
-from pytest_simbench.tuning.target import FAILED, Look, Target
+from pytest_simbench.tuning.target import MARGIN, Look, Target
 from pytest_simbench.tuning.trials import Candidate, Trials, least_costs
-
-SHARE_MARGIN = 0.05
-"""Of shares and of yes or no: 5 points more errors are not worse."""
-
-MARGIN = 0.1
-"""Of other errors: a tenth more, or the smallest difference that means anything, is not worse. A
-law or a claim that is kept is right, however well."""
 
 DEARER = 2.0
 """Times today's cost that the recommended point may have."""
@@ -33,22 +23,13 @@ SEEDS = 72
 for the bets."""
 
 
-def allowed(target: Target, error: float) -> float:
-    """The error up to which a candidate is not worse than one with this error."""
-    if target.metric is None:
-        return max(1.0 if target.laws else 0.0, (1 + MARGIN) * error)
-    if target.metric.bounded:
-        return error + SHARE_MARGIN
-    return error + max(MARGIN * error, target.metric.smallest_difference)
-
-
 def recommended(done: Sequence[Candidate], trials: Trials) -> tuple[Candidate, str]:
     """The candidate to take, today's if it is that, and why."""
     today, target = done[0], trials.target
     within = [c for c in done if not c.ended and c.cost() <= DEARER * today.cost()]
     errors = [target.together(c.errors, least=1.0) for c in within]
     best = min(errors)
-    limit = best + _margin(target, within[errors.index(best)].errors)
+    limit = best + target.margin(within[errors.index(best)].errors)
     right = [c for c, error in zip(within, errors, strict=True) if error <= limit]
     found = min(right, key=lambda c: c.cost())
     if found is today or (today in right and found.cost() > WORTH * today.cost()):
@@ -60,13 +41,6 @@ def recommended(done: Sequence[Candidate], trials: Trials) -> tuple[Candidate, s
     )
 
 
-def _margin(target: Target, errors: Mapping[Look, Any]) -> float:
-    """By how much other errors may be larger together; of those that failed nothing follows."""
-    ended = {k: error for k, error in errors.items() if target.laws or np.max(error) < FAILED}
-    known = target.together(ended or errors, least=1.0)
-    return allowed(target, known) - known
-
-
 @dataclass(frozen=True)
 class Judgement:
     """What the held-out half says of a candidate beside today's settings.
@@ -75,6 +49,7 @@ class Judgement:
         verdict: `better`, `not worse`, `worse` or `not shown`.
         worse_by: by how much the error is larger, with its interval; None of laws and claims.
         cheaper: today's cost over the candidate's, with its interval; None where too few.
+        several: of each target of several, by its name.
     """
 
     verdict: str
@@ -83,10 +58,17 @@ class Judgement:
     worse_by: Interval | None
     cheaper: Interval | None
     reason: str
+    several: Mapping[str, Judgement] = field(default_factory=dict, repr=False)
 
 
 def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
     """The verdict from the looks that both have had on the held-out half."""
+    if len(target.parts) > 1:
+        several = {part.name: judged(today, found, part) for part in target.parts}
+        verdicts = [one.verdict for one in several.values()]
+        worst = next(v for v in ("worse", "not shown", "better", "not worse") if v in verdicts)
+        after = target.beside(today.errors).together(found.errors)
+        return Judgement(worst, 0.0, after, None, None, "of each of them:", several)
     looks = [look for look in target.judged if look in today.errors and look in found.errors]
     if target.laws:
         looks = [look for look in looks if look.number == 1]
@@ -110,7 +92,7 @@ def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
         return Judgement(verdict, before, after, None, cheaper, reason)
     more = [found.errors[look] - today.errors[look] for look in looks]
     bound = _difference(more, target.metric.bounded)
-    margin = _margin(target, {look: today.errors[look] for look in looks})
+    margin = target.margin({look: today.errors[look] for look in looks})
     verdict, reason = _of_seeds(bound, margin, target.metric.smallest_difference, more)
     return Judgement(verdict, before, after, bound, cheaper, reason)
 
@@ -122,7 +104,7 @@ def _of_laws(
     worse = {
         look.task.name: found.errors[look] / today.errors[look]
         for look in looks
-        if found.errors[look] > allowed(target, today.errors[look])
+        if found.errors[look] > target.allowed(today.errors[look])
     }
     if worse:
         name = max(worse, key=lambda key: worse[key])
@@ -130,7 +112,7 @@ def _of_laws(
             f"{len(worse)} of {len(looks)} laws at other parameters, {name} "
             f"{significant(worse[name])} times"
         )
-    better = any(today.errors[look] > allowed(target, found.errors[look]) for look in looks)
+    better = any(today.errors[look] > target.allowed(found.errors[look]) for look in looks)
     verdict = "better" if better else "not worse"
     return verdict, (
         f"each of {len(looks)} laws at other parameters is kept, or broken by at most "

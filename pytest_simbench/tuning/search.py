@@ -2,7 +2,8 @@
 
 The trials of a search come one after the other from one process. Each has a sampler of its own,
 seeded by the search's seed and its number, so that a search that was interrupted comes by the same
-trials again; what is recorded it does not repeat, and then goes on as it would have."""
+trials again; what is recorded it does not repeat, and then goes on as it would have. It keeps no
+journal, which torn or locked would end it."""
 
 from __future__ import annotations
 

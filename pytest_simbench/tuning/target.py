@@ -53,6 +53,13 @@ FAILED = 1e6
 """Error of a repetition that failed, where the worst is not known: nothing that ends is so far off.
 """
 
+SHARE_MARGIN = 0.05
+"""Of shares and of yes or no: 5 points more errors are not worse."""
+
+MARGIN = 0.1
+"""Of other errors: a tenth more, or the smallest difference that means anything, is not worse. A
+law or a claim that is kept is right, however well."""
+
 FLOOR = 0.01
 """Of a law's error: below a hundredth of its tolerance nothing is better."""
 
@@ -88,6 +95,7 @@ class Target:
         claims: of a test, on its task.
         converged: whether the metric's right value is that of a smaller time step.
         first_judged: seed of the judged half's first number.
+        most: an error beyond which a candidate is hopeless, whatever it costs.
     """
 
     name: str
@@ -98,6 +106,12 @@ class Target:
     claims: Claims = ()
     converged: bool = False
     first_judged: int = FIRST_JUDGED
+    most: float = math.inf
+
+    @property
+    def parts(self) -> tuple[Target, ...]:
+        """What it consists of, see `tuning.several`."""
+        return (self,)
 
     @property
     def laws(self) -> bool:
@@ -121,6 +135,18 @@ class Target:
     def word(self) -> str:
         """Its name for ids: `laws`, `stacking`, `test_insert`."""
         return self.name.rpartition("::")[2].partition(":")[0].partition("[")[0]
+
+    def asks(self, look: Look) -> bool:
+        """Whether it is one of its looks, of either half."""
+        return look.task.name in {mine.task.name for mine in self.chosen}
+
+    def costs(self, looks: Collection[Look]) -> bool:
+        """Whether these are enough to hold one cost against another."""
+        return bool(looks)
+
+    def beside(self, today: Mapping[Look, Any]) -> Target:
+        """The same, once the errors of today's settings are known."""
+        return self
 
     def error(self, look: Look, record: Record, first: Record) -> Any:
         """Of one repetition, 0 or more; None where nothing tells what is right. Of claims one for
@@ -164,6 +190,20 @@ class Target:
             worst[phenomenon] = max(worst.get(phenomenon, least), value)
         return math.exp(sum(map(math.log, worst.values())) / len(worst))
 
+    def allowed(self, error: float) -> float:
+        """The error up to which a candidate is not worse than one with this error."""
+        if self.metric is None:
+            return max(1.0 if self.laws else 0.0, (1 + MARGIN) * error)
+        if self.metric.bounded:
+            return error + SHARE_MARGIN
+        return error + max(MARGIN * error, self.metric.smallest_difference)
+
+    def margin(self, errors: Mapping[Look, Any]) -> float:
+        """By how much others may be larger together; of those that failed nothing follows."""
+        ended = {k: error for k, error in errors.items() if self.laws or np.max(error) < FAILED}
+        known = self.together(ended or errors, least=1.0)
+        return self.allowed(known) - known
+
 
 def _off(value: float | None, claim: Bound) -> float:
     """How far a value is on the wrong side of a limit, in units of the limit (of 0: of the metric);
@@ -186,8 +226,8 @@ def target(
     """What a command line names.
 
     Args:
-        name: `laws:NAME,...` with phenomena or laws, the name of a task or of measured data, or a
-            test's.
+        name: `laws`, or `laws:NAME,...` with phenomena or laws; the name of a task or of measured
+            data; or a test's.
         cost: of `records.metrics.COSTS`.
         error: the metric to choose by, `converged` or `converged:METRIC`; None for the task's own,
             or the test's claims.
@@ -203,10 +243,12 @@ def target(
     if cost not in costs:
         raise TuningError(f"--cost={cost:.60}: choose from {', '.join(costs)}")
     kind, colon, rest = name.partition(":")
-    if colon and kind == LAWS_WORD:
+    if kind == LAWS_WORD:
         if error is not None:
             raise TuningError("--error: laws have their own, in tolerances; leave it out")
-        laws = [law for law in _laws(rest.split(",")) if {*law.needs} <= {*can}]
+        laws = [
+            law for law in _laws(rest.split(",") if colon else PHENOMENA) if {*law.needs} <= {*can}
+        ]
         if not laws:
             raise TuningError(f"{name}: the simulator cannot do any of these laws")
         others = [other for law in laws if (other := held_out(law)) is not None]
@@ -222,7 +264,7 @@ def target(
     else:
         raise TuningError(
             f"nothing to tune for is named {name[:60]!r}; choose from {', '.join(TASKS)},"
-            f" laws:NAME,... with {', '.join(PHENOMENA)} or single laws, or FILE.py::TEST"
+            f" laws, laws:NAME,... with {', '.join(PHENOMENA)} or single laws, or FILE.py::TEST"
         )
     chosen, kept, first = _halves(task, seeds, judged)
     if claims and not error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from statistics import fmean
 from typing import Any
 
 from pytest_simbench.client.errors import Unavailable, WorkerError
@@ -107,10 +108,15 @@ class Candidate:
         return sum(not record.ok for record in self.records.values())
 
     def cost(self, looks: Sequence[Look] = ()) -> float:
-        """The mean, over all looks or some; infinite where there is none. Of several looks at a law
-        the least counts: they differ by the machine's noise alone."""
+        """The mean, over all looks or some, of tasks and of laws together; infinite where there is
+        none. Of several looks at a law the least counts: they differ by the machine's noise alone.
+        """
         known = least_costs({k: self.costs[k] for k in looks or self.costs if k in self.costs})
-        return sum(known.values()) / len(known) if known else float("inf")
+        means: dict[str, list[float]] = {}
+        for look, cost in known.items():
+            kind = "" if isinstance(look.task, Law) else look.task.name
+            means.setdefault(kind, []).append(cost)
+        return fmean(map(fmean, means.values())) if means else float("inf")
 
 
 def least_costs(costs: Mapping[Look, float]) -> dict[Look, float]:
@@ -163,13 +169,15 @@ class Trials:
                 why = record.error.message if record.error else "none has a cost and an error"
                 what = "today's settings" if one is found else f"{FINER} times as many steps"
                 raise TuningError(f"{what} cannot be judged: {why:.300}")
+        self.target = self.target.beside(found.errors)
         self.timeout = float(max(SHORTEST, round(SLOWER * max(times))))
         return found
 
     def choose(self, name: str, changes: Mapping[str, Any], done: Sequence[Candidate]) -> Candidate:
         """Look at settings, until it is known that they are hopeless: a finished candidate had on
         the same looks at most `CHEAPER` of the cost, and in all an error that this one cannot come
-        below, were all its other looks without one; or more repetitions failed than of today's."""
+        below, were all its other looks without one; or that is more than the target's `most`; or
+        more repetitions failed than of today's."""
         found = Candidate(name, changes)
         for look in self._looks(found, self.target.chosen):
             if found.failed > done[0].failed:
@@ -207,7 +215,9 @@ class Trials:
     def _hopeless(self, found: Candidate, done: Sequence[Candidate]) -> bool:
         chosen, looks = self.target.chosen, list(found.costs)
         least = self.target.together(found.errors, chosen)
-        return bool(looks) and any(
+        if least > self.target.most:
+            return True
+        return self.target.costs(looks) and any(
             self.target.together(other.errors, chosen) <= least
             and other.cost(looks) <= CHEAPER * found.cost()
             for other in done

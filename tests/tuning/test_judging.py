@@ -11,7 +11,7 @@ import pytest
 from pytest_simbench.laws import LAWS
 from pytest_simbench.measure.verdicts import at_least, at_most
 from pytest_simbench.records.metrics import Metric
-from pytest_simbench.tuning.judging import SEEDS, allowed, judged, recommended
+from pytest_simbench.tuning.judging import SEEDS, judged, recommended
 from pytest_simbench.tuning.target import FAILED, Look, Target
 from pytest_simbench.tuning.trials import Candidate
 from tests.approval import assert_approved_message
@@ -59,9 +59,9 @@ def test_the_cheapest_as_right_as_the_best(
 
 def test_margins() -> None:
     of = target()
-    assert allowed(of, 0.2) == pytest.approx(0.25)
-    assert allowed(replace(of, metric=None), 0.5) == 1.0  # a law that is kept
-    assert allowed(replace(of, metric=None), 20.0) == pytest.approx(22.0)
+    assert of.allowed(0.2) == pytest.approx(0.25)
+    assert replace(of, metric=None).allowed(0.5) == 1.0  # a law that is kept
+    assert replace(of, metric=None).allowed(20.0) == pytest.approx(22.0)
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_claims_are_judged_as_a_test_judges_them(
     found = judged(with_records(before, 1.0), with_records(after, 0.5), of)
     assert found.verdict == verdict
     assert_approved_message(str(found))
-    assert allowed(of, 0.0) == 0.0  # who keeps them may not break them
+    assert of.allowed(0.0) == 0.0  # who keeps them may not break them
 
 
 def test_nothing_to_hold_them_against() -> None:
