@@ -200,8 +200,9 @@ def word(text: str, form: str = "a name") -> str:
 
 def profiles(text: str) -> tuple[str, ...]:
     """Names, or files that end in .toml, separated by commas, each once."""
+    form = "default, tuned, real or file, or a file that ends in .toml"
     parts = (part.strip() for part in text.split(","))
-    return tuple(dict.fromkeys((file if p.endswith(".toml") else word)(p) for p in parts))
+    return tuple(dict.fromkeys(file(p) if p.endswith(".toml") else word(p, form) for p in parts))
 
 
 def simulator(text: str) -> str:
