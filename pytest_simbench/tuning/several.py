@@ -66,7 +66,7 @@ class Several(Target):
         part = next(part for part in self.parts if part.asks(look))
         return part.error(look, record, first)
 
-    def costs(self, looks: Collection[Look]) -> bool:
+    def comparable(self, looks: Collection[Look]) -> bool:
         return all(any(map(part.asks, looks)) for part in self.parts)
 
     def together(

@@ -140,7 +140,7 @@ class Target:
         """Whether it is one of its looks, of either half."""
         return look.task.name in {mine.task.name for mine in self.chosen}
 
-    def costs(self, looks: Collection[Look]) -> bool:
+    def comparable(self, looks: Collection[Look]) -> bool:
         """Whether these are enough to hold one cost against another."""
         return bool(looks)
 

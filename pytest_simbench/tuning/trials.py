@@ -217,7 +217,7 @@ class Trials:
         least = self.target.together(found.errors, chosen)
         if least > self.target.most:
             return True
-        return self.target.costs(looks) and any(
+        return self.target.comparable(looks) and any(
             self.target.together(other.errors, chosen) <= least
             and other.cost(looks) <= CHEAPER * found.cost()
             for other in done

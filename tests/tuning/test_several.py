@@ -77,7 +77,7 @@ def test_the_error_is_that_of_the_worst_in_margins() -> None:
     assert of.together({**had, first: 0.0, last: 0.3}) == pytest.approx(2.0)
     assert of.together({last: 0.3}, of.chosen) == pytest.approx(1.0)  # the other may have none
     assert of.together({}) == 0.0
-    assert (of.costs(of.chosen[:2]), of.costs(of.chosen[1:3])) == (False, True)
+    assert (of.comparable(of.chosen[:2]), of.comparable(of.chosen[1:3])) == (False, True)
 
 
 def test_each_law_counts_by_itself() -> None:
