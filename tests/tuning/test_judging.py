@@ -118,7 +118,9 @@ def test_a_law_is_held_against_itself() -> None:
         assert_approved_message(str(found))
         return found.verdict
 
-    assert verdict([0.1, 8.0], [0.9, 8.5]) == "not worse"
+    assert verdict([0.1, 8.0], [1.0, 8.5]) == "not worse"
+    assert verdict([0.1, 0.1], [1.2, 5.0]) == "worse"  # the name is that of the worst
+    assert verdict([0.1, 0.1], [5.0, 1.2]) == "worse"
     assert verdict([0.1, 8.0], [1.2, 0.5]) == "worse"  # one is broken now, whatever the other
     assert verdict([0.1, 8.0], [0.1, 0.5]) == "better"
 

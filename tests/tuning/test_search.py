@@ -122,6 +122,12 @@ def test_a_range_may_begin_at_zero(tmp_path: Path) -> None:
     assert one._one(optuna.trial.FixedTrial({at.name: 0.0}), at) == 0.0 == at.over.low
 
 
+def test_what_lies_outside_of_its_range_hides_no_other(tmp_path: Path) -> None:
+    one, _ = search(tmp_path)
+    one.base = replace(BASE, timestep=0.1)
+    assert [*one._first()] == [{"cone": "pyramidal"}, {"cone": "elliptic"}]
+
+
 @pytest.mark.parametrize(("jobs", "took"), [(1, 4), (4, 1)])
 def test_too_little_time(tmp_path: Path, jobs: int, took: int) -> None:
     pytest.importorskip("optuna")
@@ -130,6 +136,7 @@ def test_too_little_time(tmp_path: Path, jobs: int, took: int) -> None:
     with pytest.raises(TuningError, match=f"2 s are too few .* take {took} s; .* for each sim"):
         one.run(2.0)
     assert len(executor.asked) < 4  # of 1 s each
+    assert [c.name for c in one.run(2.0, 1)] == ["today"]  # who says how many has the time
 
 
 def test_without_optuna(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -89,6 +89,20 @@ def test_settings_that_an_adapter_refuses_fail_that_candidate_alone(tmp_path: Pa
     assert found.ended == "failed: SceneRefused in load"
 
 
+def test_what_another_one_ended_is_asked_by_itself(tmp_path: Path) -> None:
+    looks, executor = trials(tmp_path, lambda s, k: 1.0, jobs=2)
+    ended = executor.end
+
+    def end(experiment: Any, number: int) -> tuple[dict[str, Any], None]:
+        found, _ = ended(experiment, number)
+        first = executor.asked.count(("today", number)) == 1
+        return {**found, "status": "interrupted" if number == 1 and first else "ok"}, None
+
+    executor.end = end
+    assert [one.number for one in looks.today().records] == [1, 2, 3, 4]
+    assert executor.asked.count(("today", 1)) == 2
+
+
 @pytest.mark.parametrize("jobs", [1, 3, 16])
 def test_the_number_of_jobs_changes_nothing(tmp_path: Path, jobs: int) -> None:
     """What is had beyond the look that ends a candidate does not count."""
