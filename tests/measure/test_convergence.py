@@ -85,6 +85,8 @@ def test_two_steps_give_an_order_without_an_interval() -> None:
     found = convergence(STEPS[:2], [4e-3, 1e-3])
     assert found.order == pytest.approx(2)
     assert (found.low, found.high) == (-math.inf, math.inf)
+    found = convergence(STEPS[:3], [16e-3, 4e-3, 1e-3])  # of three there is one
+    assert (found.low, found.high) == pytest.approx((2, 2))
 
 
 @given(st.lists(st.floats(0, 1e3), min_size=2, max_size=6), st.floats(0, 1))

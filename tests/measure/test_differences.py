@@ -149,6 +149,13 @@ def test_what_cannot_be_certain_yet_says_how_many_pairs_it_takes(n: int, needs: 
     assert found.verdict == ("better" if needs == 0 else "undecided")
 
 
+def test_seeds_that_others_have_are_none_of_theirs() -> None:
+    """Two of four repetitions stay undecided, however many two other sides have."""
+    few = planted({"a": [0.0] * 4, "b": [1.0] * 4}, "hit")
+    for more in ({}, planted({"c": [1.0] * 20, "d": [1.0] * 20}, "hit")):
+        assert ("b", "a", "hit") not in wins({**few, **more})
+
+
 def test_ties_do_not_count_as_pairs_that_differ() -> None:
     for differ, verdict in ((5, "undecided"), (7, "better")):
         found = one(

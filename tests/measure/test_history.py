@@ -78,6 +78,19 @@ def test_what_the_machine_or_rounding_makes_is_not_told(more: int, tiny: float) 
     assert history.sentences() == ["no change is supported by these repetitions"]
 
 
+def test_a_slower_machine_is_no_slower_release() -> None:
+    """Twice the CPU time, for the stepping and for the control alike; and of the stepping alone."""
+    for control, told in ((2.0, "no change is supported by these repetitions"), (1.0, "CPU")):
+        found = [
+            replace(r, stepping={"cpu": (1.0 + r.seed % 7 / 100) * (1 + late), "simulated": 10.0,
+                                 "wall": 1.0, "control_cpu": 1e-4 * (control if late else 1.0)})
+            for k, late in enumerate((0, 0, 1, 1))
+            for r in release(str(k + 1), 1.0)
+        ]  # fmt: skip
+        (history,) = histories(found, {"stacking": METRICS})
+        assert told in history.sentences()[0]
+
+
 def test_a_release_that_fails_is_named_with_its_message() -> None:
     broken = [
         replace(failed(k), simulator="engine==3", test="test_stacking[engine==3-headless]")
