@@ -127,7 +127,8 @@ def test_the_repetition_whose_display_died_fails_and_the_next_has_another(
 
 
 SCRIPT = """
-import time
+import signal, time
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
 from pytest_simbench.client.display import Displays
 Displays().environment()
 print("ready", flush=True)

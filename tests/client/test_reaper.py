@@ -55,7 +55,8 @@ def test_children_of_an_engine(case: Case, tmp_path: Path, fault: str, status: s
 
 
 SCRIPT = """
-import sys, time
+import signal, sys, time
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it
 from dataclasses import replace
 from pathlib import Path
 from pytest_simbench.experiment.case import Case
