@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import json
 import os
@@ -154,6 +155,21 @@ def test_each_record_is_on_the_disk_before_the_next_thing_happens(
     for number in (1, 2, 3):
         assert file.append(record(number).to_json())
         assert synced == list(range(1, number + 1))
+
+
+@pytest.mark.parametrize(
+    ("number", "written"), [(errno.EIO, False), (errno.EINVAL, True), (errno.ENOTSUP, True)]
+)
+def test_what_does_not_reach_the_disk_waits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, written: bool
+) -> None:
+    """A pipe knows of no disk."""
+
+    def fsync(descriptor: int) -> None:
+        raise OSError(number, "")
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    assert LinesFile(tmp_path, RECORDS).append("{}") is written
 
 
 def test_a_new_file_is_on_the_disk_by_its_name(

@@ -90,6 +90,11 @@ def test_records_of_one_test_that_were_mixed_are_rows_of_their_own(
     assert label in [row.label for row in rows]
 
 
+def test_modes_have_rows_of_their_own_headless_first() -> None:
+    rows = series([record(mode="gui"), record(mode="headless")])
+    assert [row.key.mode for row in rows] == ["headless", "gui"]
+
+
 def test_a_parameter_that_changes_no_setting_still_tells_rows_apart() -> None:
     """Else each seed would count twice."""
     runs = [record(1, test=f"t.py::test_x[engine-headless-{p}]") for p in "ab"]
