@@ -112,16 +112,19 @@ def named(
     names = [one for part in tasks.split(",") if (one := part.strip())]
     of_laws = colon + laws or LAWS_WORD * (LAWS_WORD in names)
     names = [one for one in names if one != LAWS_WORD]
-    if asked or len(names) + bool(of_laws) < 2:
+    several = len(names) + bool(of_laws) > 1
+    if asked or not (several or ":" in "".join(names)):
         return target(name, cost, error, seeds, judged, can, asked)
     if error is not None:
-        raise TuningError("--error: of several, write each one's behind its name, NAME:METRIC")
+        raise TuningError("--error: write it behind the name, NAME:METRIC; of several each one's")
     parts = [target(of_laws, cost, None, seeds, judged, can)] if of_laws else []
     for one in names:
         task, _, metric = one.partition(":")
-        if metric.partition(":")[0] == CONVERGED:
+        if several and metric.partition(":")[0] == CONVERGED:
             raise TuningError(f"{one}: {CONVERGED} is an error of one task alone")
         parts.append(target(task, cost, metric or None, seeds, judged, can))
+    if not several:
+        return parts[0]
     if len({part.name for part in parts}) < len(parts):
         raise TuningError(f"{name}: it names one of them twice")
     chosen = [

@@ -51,15 +51,19 @@ def test_what_a_command_line_names() -> None:
     assert (found.word, found.laws, found.unit) == (
         "several", False, "margins",
     )  # fmt: skip
-    assert named("stacking", "cpu_cost", "at_end", 3, 9).parts[0].name == "stacking"
+    for alone, error in (("stacking", "at_end_strict"), ("stacking:at_end_strict,", None)):
+        one = named(alone, "cpu_cost", error, 3, 9)
+        assert (one.name, one.metric and one.metric.name) == ("stacking", "at_end_strict")
+    assert named("stacking:converged:placed", "cpu_cost", None, 3, 9).converged
     found = named("laws,stacking", "cpu_cost", None, 3, 9)
     assert [look.task.name for look in found.chosen[:-3]] == [law.name for law in LAWS]
 
 
 @pytest.mark.parametrize(
     ("name", "error"),
-    [("stacking,throwing", "hit"), ("stacking,pushing:hit", None), ("stacking,throwing:hits", None),
-     ("stacking:converged,throwing", None), ("stacking,stacking", None), ("stacking,x", None)],
+    [("stacking,throwing", "hit"), ("stacking:hit", "hit"), ("stacking,pushing:hit", None),
+     ("stacking,throwing:hits", None), ("stacking:converged,throwing", None),
+     ("stacking,stacking", None), ("stacking,x", None)],
 )  # fmt: skip
 def test_bad_names(name: str, error: str | None) -> None:
     with pytest.raises(TuningError) as told:
