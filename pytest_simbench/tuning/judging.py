@@ -68,7 +68,7 @@ def judged(today: Candidate, found: Candidate, target: Target) -> Judgement:
         verdicts = [one.verdict for one in several.values()]
         worst = next(v for v in ("worse", "not shown", "better", "not worse") if v in verdicts)
         after = target.beside(today.errors).together(found.errors)
-        return Judgement(worst, 0.0, after, None, None, "of each of them:", several)
+        return Judgement(worst, 0.0, after, None, None, "", several)
     looks = [look for look in target.judged if look in today.errors and look in found.errors]
     if target.laws:
         looks = [look for look in looks if look.number == 1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -138,7 +139,11 @@ class Target:
 
     def asks(self, look: Look) -> bool:
         """Whether it is one of its looks, of either half."""
-        return look.task.name in {mine.task.name for mine in self.chosen}
+        return look.task.name in self._tasks
+
+    @cached_property
+    def _tasks(self) -> frozenset[str]:
+        return frozenset(look.task.name for look in self.chosen)
 
     def comparable(self, looks: Collection[Look]) -> bool:
         """Whether these are enough to hold one cost against another."""
