@@ -201,6 +201,14 @@ def run_gate(
     )
     if not common and (limits or typed):
         broken.append(_nothing_in_common(before, after))
+    number = max(1, sum(change.by_chance for change in changes))
+    few = [
+        f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
+        f"to be significant among {number} comparisons"
+        for change in changes
+        if _smallest_p(change.comparison) * number > ALPHA * share
+    ]
+    notes += few
     for limit, of_limit in found.items():
         reasons = {test: why for test, why in of_limit.items() if isinstance(why, Untested)}
         if common and len(reasons) == len(common):
@@ -210,13 +218,8 @@ def run_gate(
             for test, (why, gone) in apart.items():
                 fails = typed and gone and after[test].ok
                 (broken if fails else notes).append(f"{test}: {limit} is not tested: {why}")
-    number = max(1, sum(change.by_chance for change in changes))
-    notes += [
-        f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
-        f"to be significant among {number} comparisons"
-        for change in changes
-        if _smallest_p(change.comparison) * number > ALPHA * share
-    ]
+    if typed and few and len(few) == len(changes):
+        broken.append("no limit can fail with so few repetitions; raise --reps in both runs")
     number = max(1, sum(change.by_chance for change in others))
     seen = [change for change in others if change.visible]
     most = min(seen, key=lambda change: _smallest_p(change.comparison), default=None)

@@ -44,6 +44,7 @@ class SimSession:
         self._failed: list[dict[str, Any]] = []
         self._passed: set[str] = set()
         self._xfailed: set[str] = set()
+        self._skipped: set[str] = set()
         self._exit_status: int = pytest.ExitCode.OK
 
     @cached_property
@@ -231,8 +232,8 @@ class SimSession:
             self.run.judged.add(report.nodeid)
         if report.when == "call" and report.passed:
             self._passed.add(report.nodeid)
-        elif report.skipped and hasattr(report, "wasxfail"):
-            self._xfailed.add(report.nodeid)
+        elif report.skipped:
+            (self._xfailed if hasattr(report, "wasxfail") else self._skipped).add(report.nodeid)
 
     @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
@@ -250,7 +251,7 @@ class SimSession:
 
             reading = self.run.reading if self.begun else RunContents()
             if reading.records or self.comparison.typed:
-                self.comparison.make(reading)
+                self.comparison.make(reading, self._skipped)
             if self.comparison.failed and session.exitstatus == pytest.ExitCode.OK:
                 session.exitstatus = pytest.ExitCode.TESTS_FAILED
         if self.begun:

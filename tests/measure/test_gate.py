@@ -139,7 +139,7 @@ def with_crashes(number: int, of: int = 20, **changes: Any) -> list[Record]:
 
 
 @pytest.mark.parametrize("limits", ["", "rtf:20%", "placed:5%,ram:10%,rtf:20%"])
-@pytest.mark.parametrize("number", [0, 1, 4, 5, 11, 19, 20])
+@pytest.mark.parametrize("number", [0, 1, 4, 5, 11, 13, 20])
 def test_more_crashes_fail_whatever_the_limits(number: int, limits: str) -> None:
     report = run(with_crashes(0), with_crashes(number), limits)
     rose = f"crashed rose from 0 % to {5 * number} % (worse by {5 * number} points, limit 0 points"
@@ -177,7 +177,7 @@ def test_crashes_count_in_shares_and_cost_nothing_where_there_is_none() -> None:
 
 
 def test_a_limit_that_compares_nothing_fails_and_says_why() -> None:
-    here = made([1.0] * 6) + made([1.0] * 6, test="test_other[engine-headless]")
+    here = made([1.0] * 7) + made([1.0] * 7, test="test_other[engine-headless]")
     text = "placed:5%,landing_error:1,ram:10%"
     report = run(here, here, text)
     both = "(test_stacking[engine-headless], test_other[engine-headless])"
@@ -186,7 +186,7 @@ def test_a_limit_that_compares_nothing_fails_and_says_why() -> None:
     waiting = run_gate(here, here, parse_limits(text, METRICS), {"stacking": METRICS}, typed=False)
     assert waiting.failures == ()
     assert missing in waiting.notes
-    nothing = run(here, made([1.0] * 6, test="test_x[e]"), "placed:5%")
+    nothing = run(here, made([1.0] * 7, test="test_x[e]"), "placed:5%")
     assert nothing.failures == (
         "nothing was compared: no test of this run is in the baseline (this run has test_x[e]; "
         "the baseline test_stacking[engine-headless], test_other[engine-headless])",
@@ -282,7 +282,9 @@ def test_what_cannot_be_compared_is_said() -> None:
     current = made([1.0] * 3, test="kept") + made([1.0] * 3, test="new")
     current[0] = replace(current[0], metrics={"placed": 1.0, "landing_error": 1.0})
     report = run(baseline, current, "placed:5%")
-    assert report.failures == ()
+    assert report.failures == (
+        "no limit can fail with so few repetitions; raise --reps in both runs",
+    )
     assert report.notes == (
         "gone is in the baseline but did not run",
         "kept: 3 pairs are too few for a change of placed to be significant among 1 comparisons",
@@ -330,6 +332,12 @@ def test_how_few_are_too_few() -> None:
     def notes(first: int, second: int, text: str = "placed:5%", seed: int = 0) -> tuple[str, ...]:
         return run(made([1.0] * first), made([1.0] * second, first_seed=seed), text).notes
 
+    vain = "no limit can fail with so few repetitions; raise --reps in both runs"
+    few = made([1.0] * 4)
+    assert run(few, made([0.0] * 4), "placed:5%").failures == (vain,)
+    waiting = parse_limits("placed:5%", METRICS)
+    assert not run_gate(few, few, waiting, {"stacking": METRICS}, typed=False).failures
+    assert run([*few, *made([1.0] * 7, test="test_x[e]")], few, "placed:5%").failures == (vain,)
     assert "4 pairs are too few" in notes(4, 4)[0]
     assert notes(5, 5) == ()
     assert "3 and 2 repetitions are too few" in notes(3, 2, seed=500)[0]
@@ -346,13 +354,14 @@ def test_how_few_are_too_few() -> None:
 
 def test_a_test_that_is_broken_is_told_beside_its_limits() -> None:
     """Only where the baseline had results, and the run has failures."""
-    assert run([failed(0)], [failed(0)], "placed:5%").failures == ()
-    assert run(made([1.0]), made([1.0]), "placed:5%").broken == ()
-    report = run(made([1.0] * 2), [failed(0), failed(1, "WorkerDied"), failed(2)], "placed:5%")
+    nothing = [failed(k) for k in range(5)]
+    assert run(nothing, nothing, "placed:5%").failures == ()
+    assert run(made([1.0] * 5), made([1.0] * 5), "placed:5%").broken == ()
+    report = run(made([1.0] * 5), [failed(5, "WorkerDied"), *nothing], "placed:5%")
     assert report.broken == report.failures[:1]
     assert report.broken == (
-        "test_stacking[engine-headless]: none of 3 repetitions finished (most often WorkerHung in "
-        "settle); 2 of 2 did in the baseline",
+        "test_stacking[engine-headless]: none of 6 repetitions finished (most often WorkerHung in "
+        "settle); 5 of 5 did in the baseline",
     )
 
 

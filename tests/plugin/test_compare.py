@@ -114,7 +114,7 @@ def test_a_first_task_that_never_finishes_hides_no_other_one(pytester: pytest.Py
 def test_the_same_again_passes_and_says_so(pytester: pytest.Pytester, baseline: Path) -> None:
     result = run_pytest(
         pytester,
-        f"{ARGUMENTS} --sim-baseline=base --sim-compare-fail=landed:0%,ram_peak:50%",
+        f"{ARGUMENTS} --sim-baseline=base --sim-compare-fail=landed:0%",
         ret=0,
     )
     result.stdout.fnmatch_lines(["no metric got worse beyond its limit"])
@@ -176,6 +176,17 @@ def test_a_limit_that_compares_nothing_fails_the_run_and_says_why(
         if code:
             result.stdout.fnmatch_lines([told])
             assert "no metric got worse" not in result.stdout.str()
+
+
+def test_a_test_that_is_skipped_now_fails_a_typed_limit(
+    pytester: pytest.Pytester, baseline: Path
+) -> None:
+    pytester.makeconftest("def pytest_runtest_setup(item): __import__('pytest').skip('refused')")
+    words = f"{ARGUMENTS} --sim-baseline=base --sim-compare-fail=landed:5%"
+    result = run_pytest(pytester, words, ret=1)
+    told = "FAILED test_falling[[]mujoco-headless[]] is in the baseline, and was skipped"
+    result.stdout.fnmatch_lines([told])
+    run_pytest(pytester, f"{ARGUMENTS} --sim-baseline=base", ret=0)
 
 
 def test_junit_has_a_property_for_each_metric(
