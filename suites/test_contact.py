@@ -43,7 +43,7 @@ def test_holds(repeat, threshold, shape):
 def test_slips(repeat, threshold):
     result = repeat(Slipping())
     result.assert_crashed_at_most(threshold("crashed", 0.15))
-    result.assert_at_most("held", threshold("held", 0.2))
+    result.assert_at_most("held", 0.2)  # `held` of --sim-threshold is of what must be held
 
 
 def judged(result):
@@ -67,7 +67,7 @@ def test_inserts(repeat, threshold, section, clearance):
 def test_keeps_out(repeat, threshold, section):
     result = judged(repeat(Oversized(section)))
     result.assert_crashed_at_most(threshold("crashed", 0.15))
-    result.assert_at_most("inserted", threshold("inserted", 0.2))
+    result.assert_at_most("inserted", 0.2)
     result.assert_at_most("overlap", threshold("overlap", 0.1))
 
 

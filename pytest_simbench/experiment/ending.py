@@ -56,7 +56,7 @@ def checked(record: Record, task: Task) -> Record:
     for metric in task.metrics:
         value = values.get(metric.name)
         if value is not None and not metric.holds(value):
-            if metric.least is None or value < metric.least - ROUNDING:
+            if metric.bounded or metric.least is None or value < metric.least - ROUNDING:
                 raise RecordError(f"{metric.name} of {task.name} cannot be {value:g}")
             values[metric.name] = metric.least
     return Record.from_dict(data, f"the outcome of {task.name}")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 KEPT = 1.0
 """A law is kept up to so many tolerances."""
@@ -17,8 +18,21 @@ KEPT = 1.0
 BROKEN = 2.0
 """Beyond so many it is broken; in between it decides nothing."""
 
-Ratios = Mapping[str, float]
-"""Error over tolerance by law; infinite where the repetition failed."""
+
+class Miss(NamedTuple):
+    """By how much a law is missed; infinite where the repetition failed.
+
+    Attributes:
+        ratio: error over tolerance, which grows with the time step.
+        error: in the law's unit.
+    """
+
+    ratio: float
+    error: float
+
+
+Misses = Mapping[str, Miss]
+"""By law."""
 
 
 @dataclass(frozen=True)
@@ -40,20 +54,24 @@ class PhenomenonVerdict:
     incomplete: tuple[str, ...]
 
 
-def better(one: Ratios, other: Ratios) -> bool:
+def better(one: Misses, other: Misses) -> bool:
     """Whether the first keeps a law that the second breaks, and breaks none that the second
-    keeps."""
-    return bool(_kept(one) & _broken(other)) and not _kept(other) & _broken(one)
+    keeps. Who breaks a law with the smaller error, since its step is smaller, is no worse there."""
+    return _ahead(one, other) and not _ahead(other, one)
 
 
-def verdict(found: Mapping[str, Ratios]) -> PhenomenonVerdict:
+def _ahead(one: Misses, other: Misses) -> bool:
+    return any(one[law].error < other[law].error for law in _kept(one) & _broken(other))
+
+
+def verdict(found: Mapping[str, Misses]) -> PhenomenonVerdict:
     """The verdict on the laws of one phenomenon, which are given by contender."""
-    laws = {law for ratios in found.values() for law in ratios}
-    compared = {who: ratios for who, ratios in found.items() if ratios.keys() == laws}
+    laws = {law for misses in found.values() for law in misses}
+    compared = {who: misses for who, misses in found.items() if misses.keys() == laws}
     unbeaten = tuple(
         who
-        for who, ratios in compared.items()
-        if not any(better(other, ratios) for other in compared.values())
+        for who, misses in compared.items()
+        if not any(better(other, misses) for other in compared.values())
     )
     best = [
         who
@@ -65,20 +83,20 @@ def verdict(found: Mapping[str, Ratios]) -> PhenomenonVerdict:
         len(laws),
         best[0] if best else None,
         unbeaten,
-        {who: len(_kept(ratios)) for who, ratios in compared.items()},
+        {who: len(_kept(misses)) for who, misses in compared.items()},
         tuple(who for who in found if who not in compared),
     )
 
 
-def worst(ratios: Ratios) -> float:
+def worst(misses: Misses) -> float:
     """The largest ratio: a simulator is trusted with a phenomenon as far as with its worst law. A
     median would hide one broken law of eight."""
-    return max(ratios.values(), default=math.nan)
+    return max((miss.ratio for miss in misses.values()), default=math.nan)
 
 
-def _kept(ratios: Ratios) -> set[str]:
-    return {law for law, ratio in ratios.items() if ratio <= KEPT}
+def _kept(misses: Misses) -> set[str]:
+    return {law for law, miss in misses.items() if miss.ratio <= KEPT}
 
 
-def _broken(ratios: Ratios) -> set[str]:
-    return {law for law, ratio in ratios.items() if ratio > BROKEN}
+def _broken(misses: Misses) -> set[str]:
+    return {law for law, miss in misses.items() if miss.ratio > BROKEN}

@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from pytest_simbench.ground.text import in_one_line
 from pytest_simbench.measure.intervals import CONFIDENCE, Interval, interval
-from pytest_simbench.measure.limits import check_threshold
+from pytest_simbench.measure.limits import LimitError, check_threshold
 from pytest_simbench.measure.verdicts import (
     ERROR,
     Bound,
@@ -165,12 +165,26 @@ class ResultSet:
 
     def judge(self, name: str | Metric, claim: Bound) -> Judgement:
         """What the repetitions say of a claim about a metric's true mean."""
-        found = self._decide(claim, lambda: self._judged(self.metric(name)))
+        metric = self.metric(name)
+        found = self._decide(claim, lambda: self._judged(metric, claim))
         return replace(found, sole=bool(self.records) and all(r.notes.sole for r in self.records))
 
-    def _judged(self, metric: Metric) -> Interval:
-        """The interval by which claims about a metric, or about crashes, are judged."""
-        return self.interval(metric, confidence(metric, self.error))
+    def _judged(self, metric: Metric, claim: Bound) -> Interval:
+        """The interval by which a claim about a metric, or about crashes, is judged: of those that
+        finished, where a crash would speak for it."""
+        level = confidence(metric, self.error)
+        if not self._favoured(metric, claim):
+            return self.interval(metric, level)
+        return interval(
+            [v for r in self.ok if (v := self.value(r, metric)) is not None], metric, level
+        )
+
+    def _favoured(self, metric: Metric, claim: Bound) -> bool:
+        """Whether what a crashed repetition counts with speaks for the claim."""
+        favours = {0.0: "at most", 1.0: "at least", None: ""}[metric.crashed]
+        return (
+            bool(self.ok and self.crashed) and metric is not CRASHED and claim.relation == favours
+        )
 
     def _decide(self, claim: Bound, interval: Callable[[], Interval]) -> Judgement:
         return judge(claim, interval())
@@ -179,7 +193,8 @@ class ResultSet:
         """Fail when the true mean is below `threshold`; shares are in 0..1.
 
         Raises:
-            LimitError: a threshold that the metric cannot reach; so do the other assertions.
+            LimitError: a threshold that the metric cannot reach, or cannot miss; so do the other
+                assertions.
         """
         __tracebackhide__ = True
         self._assert(self.metric(name), at_least(threshold))
@@ -206,7 +221,7 @@ class ResultSet:
         self._assert_recorded()
         if self.crashed:
             self._refute("")
-        found = Judgement(Verdict.SUPPORTED, at_most(0.0), self._judged(CRASHED))
+        found = Judgement(Verdict.SUPPORTED, at_most(0.0), self._judged(CRASHED, at_most(0.0)))
         self.judged.append((CRASHED, found))
 
     def assert_crashed_at_most(self, share: float) -> None:
@@ -237,7 +252,7 @@ class ResultSet:
     def _refute(self, why: str) -> NoReturn:
         """Fail for crashes of which there may be none: one is enough."""
         __tracebackhide__ = True
-        found = Judgement(Verdict.REFUTED, at_most(0.0), self._judged(CRASHED))
+        found = Judgement(Verdict.REFUTED, at_most(0.0), self._judged(CRASHED, at_most(0.0)))
         self.judged.append((CRASHED, found))
         raise AssertionError(f"{self._crashes()}{why}")
 
@@ -245,6 +260,10 @@ class ResultSet:
         __tracebackhide__ = True
         for claim in claims:
             check_threshold(metric, claim.value)
+        vain = all(claim.value == (claim.relation == "at most") for claim in claims)
+        if vain and metric.bounded and metric is not CRASHED:
+            told = f"{claims[0].relation} {metric.format(claims[0].value)}"
+            raise LimitError(f"{metric.name} is always {told}: this claim can never fail")
         self._assert_recorded()
         if not self.ok and metric is not CRASHED:
             raise AssertionError(f"{metric.name} cannot be judged: {self._crashes()}")
@@ -259,12 +278,13 @@ class ResultSet:
             if judgement.verdict is Verdict.REFUTED:
                 wrong = "below" if judgement.claim.relation == "at least" else "above"
                 limit = metric.format(judgement.claim.value)
-                raise AssertionError(f"{self._measured(metric)}, which is {wrong} {limit}")
+                told = self._measured(metric, judgement.claim)
+                raise AssertionError(f"{told}, which is {wrong} {limit}")
         for judgement in found:
             if not judgement.verdict.decided:
                 asked = f"{judgement.claim.relation} {metric.format(judgement.claim.value)}"
                 told = f"{judgement.verdict} whether {asked}, {judgement.advice}"
-                text = f"{self._measured(metric)}: {told}"
+                text = f"{self._measured(metric, judgement.claim)}: {told}"
                 if self.strict:
                     raise AssertionError(f"{text} (--sim-strict)")
                 if self.warns:
@@ -284,17 +304,19 @@ class ResultSet:
             return f"no {level} bounds yet"
         return f"{level} bounds {metric.format(found.low)} and {metric.format(found.high)}"
 
-    def _measured(self, metric: Metric) -> str:
+    def _measured(self, metric: Metric, claim: Bound) -> str:
         """What was measured, with simulator, mode, profile, bounds and number of repetitions."""
-        found, crashed = self._judged(metric), len(self.crashed)
+        found, crashed = self._judged(metric, claim), len(self.crashed)
         if metric is CRASHED:
             return f"{self._crashes()} ({self._bounds(metric, found)})"
         number = f"{found.n} repetition{'s' if found.n > 1 else ''}"
-        if crashed and self.value(self.crashed[0], metric) is not None:
+        counts = crashed and self.value(self.crashed[0], metric) is not None
+        if counts and not self._favoured(metric, claim):
             number += f", {crashed} crashed and counted as {metric.format(metric.crashed or 0.0)}"
         elif crashed:
             number += f" that finished, {crashed} crashed"
-            number += ", not counted by --protocol paper" if metric.crashed is not None else ""
+            paper = metric.crashed is not None and not counts
+            number += ", not counted by --protocol paper" if paper else ""
         if without := self.without(metric):
             number += f", {without} without a value"
         return (

@@ -9,7 +9,7 @@ from typing import Any, Protocol, Self
 
 from pytest_simbench.records import checked
 from pytest_simbench.records.checked import Name
-from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.metrics import COSTS, CRASHED, Metric
 from pytest_simbench.records.record import plain
 
 SCHEMA = 1
@@ -73,7 +73,14 @@ class TaskDescription(FolderLine):
 
     @classmethod
     def of(cls, task: Describing) -> TaskDescription:
-        """What a task says of itself; a reference that is no finite number is none."""
+        """What a task says of itself; a reference that is no finite number is none.
+
+        Raises:
+            ValueError: a metric has the name of one that every task has.
+        """
+        every = {metric.name for metric in (*COSTS, CRASHED)}
+        if taken := [metric.name for metric in task.metrics if metric.name in every]:
+            raise ValueError(f"{task.name}: every task has a metric {taken[0]!r}; rename this one")
         known = {name: value for name, value in task.references.items() if isfinite(value)}
         return cls(task.name, tuple(task.metrics), known)
 

@@ -101,7 +101,9 @@ class Metric:
         return self.kind != "value"
 
     def holds(self, value: float) -> bool:
-        """Whether it can have that value: a proportion in 0..1, others from their least."""
+        """Whether it can have that value: yes or no, a share in 0..1, others from their least."""
+        if self.kind == "yes_no":
+            return value in (0, 1)
         return 0 <= value <= 1 if self.bounded else self.least is None or value >= self.least
 
     @property

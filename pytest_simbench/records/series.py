@@ -299,7 +299,8 @@ def step_text(seconds: float) -> str:
 
 def short(test: str) -> str:
     """A test's id without file and class."""
-    return test.rpartition("::")[2]
+    name, bracket, parameters = test.partition("[")
+    return name.rpartition("::")[2] + bracket + parameters
 
 
 def side_by_side(

@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 
 from pytest_simbench.measure.intervals import interval, proportion
+from pytest_simbench.measure.limits import LimitError
 from pytest_simbench.measure.results import InconclusiveWarning, ResultSet
-from pytest_simbench.measure.verdicts import at_least
-from pytest_simbench.records.metrics import CRASHED, Metric, UnknownMetric
+from pytest_simbench.measure.verdicts import Bound, Verdict, at_least, at_most
+from pytest_simbench.records.metrics import CRASHED, Better, Metric, UnknownMetric
 from pytest_simbench.records.record import Failure
 from tests.records.build import METRICS, failed, record, records
 
@@ -67,7 +68,7 @@ def test_a_crashed_repetition_counts_with_the_worst_value_that_there_is(
 @pytest.mark.parametrize(
     ("metric", "protocol", "said"),
     [
-        ("placed", "fast", r"placed is 90 % .*, 20 repetitions, 2 crashed and counted as 0 %\)"),
+        ("placed", "fast", r"placed is 100 % .*, 18 repetitions that finished, 2 crashed\)"),
         ("landing_error", "fast", r"is 1 m .*, 18 repetitions that finished, 2 crashed\)"),
         ("placed", "paper", r"placed is 100 % .*, 18 repetitions that finished, 2 crashed, not "
                             r"counted by --protocol paper\)"),
@@ -123,6 +124,21 @@ def test_a_metric_that_is_not_available_is_left_out() -> None:
     assert ResultSet(made, METRICS).values("placed") == [0.5]
 
 
+@pytest.mark.parametrize(("relation", "value"), [("at_least", 0), ("at_most", 1.0)])
+def test_a_claim_that_cannot_fail_is_refused(relation: str, value: float) -> None:
+    with pytest.raises(LimitError, match=r"placed is always at .* %: this claim can never fail"):
+        getattr(placed(*GOOD), f"assert_{relation}")("placed", value)
+
+
+@pytest.mark.parametrize(("better", "claim"), [("higher", at_most(0.5)), ("lower", at_least(0.5))])
+def test_no_crash_speaks_for_a_claim(better: Better, claim: Bound) -> None:
+    """Of 10 repetitions 9 crashed, which counts as the worst; the other one is against it."""
+    metric = Metric("x", "x", better=better, kind="yes_no")
+    ended = record(0, metrics={"x": float(better == "higher")})
+    made = ResultSet([ended, *(failed(k) for k in range(1, 10))], (metric,))
+    assert made.judge("x", claim).verdict is Verdict.NOT_JUDGED
+
+
 PERFECT = [1.0] * 20
 HALF = [1.0, 0.5, 1.0, 1.0, 1.0]
 
@@ -131,7 +147,6 @@ HALF = [1.0, 0.5, 1.0, 1.0, 1.0]
     ("values", "crashed", "check", "given"),
     [
         (GOOD, 0, "at_least", ("placed", 0.8)),
-        (GOOD, 0, "at_most", ("placed", 1.0)),
         (GOOD, 0, "between", ("placed", 0.8, 1.0)),
         (HALF, 0, "at_least", ("rtf", 10)),
         (HALF, 0, "at_least", ("rtf", 17.5)),  # the same in all repetitions

@@ -38,6 +38,17 @@ def test_numpy_values_are_plain_and_what_is_no_number_is_no_reference() -> None:
     assert TaskDescription.from_dict(said) == TaskDescription("baking", (metric,), {"x": 0.25})
 
 
+@pytest.mark.parametrize("name", ["crashed", "ram"])
+def test_a_task_has_no_metric_of_the_name_that_every_task_has(name: str) -> None:
+    class Driving:
+        references: ClassVar = {}
+        metrics = (Metric(name, name),)
+
+    Driving.name = "driving"  # type: ignore[attr-defined]
+    with pytest.raises(ValueError, match=f"driving: every task has a metric '{name}'; rename"):
+        TaskDescription.of(Driving())  # type: ignore[arg-type]
+
+
 def test_a_newer_plugin_may_say_more_of_a_metric() -> None:
     data = {"task": "t", "metrics": [{**METRIC, "colour": "red"}], "colour": "red"}
     assert TaskDescription.from_dict(data) == TaskDescription("t", (Metric("x", "X"),))

@@ -33,6 +33,11 @@ def test_two_values_differ_by_a_millimetre_that_is_seen(
     assert metric.differs(before, after) == metric.differs(after, before) == differ
 
 
+def test_yes_or_no_is_nothing_in_between() -> None:
+    metric = Metric("hit", "hit", kind="yes_no")
+    assert [metric.holds(value) for value in (0.0, 0.6, 1.0)] == [True, False, True]
+
+
 def test_a_crash_counts_with_the_worst_there_is() -> None:
     for better, worst in (("higher", 0.0), ("lower", 1.0), (None, None)):
         assert Metric("x", "x", better=better, kind="yes_no").crashed == worst

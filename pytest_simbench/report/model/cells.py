@@ -29,7 +29,10 @@ def metric_value(value: float, metric: Metric) -> str:
     What is a thousand times smaller than the metric's resolution is rounding, and nothing.
     """
     if metric.bounded:
-        return f"{100 * value:.0f}"
+        shown = f"{100 * value:.0f}"
+        if shown in ("0", "100") and 0 < value < 1:  # not quite none or all
+            return f"{min(99.9, max(0.1, 100 * value)):.1f}"
+        return shown
     if abs(value) < metric.smallest_difference / 1000:
         return "0"
     return significant(value, 4 if abs(value) >= 1 else 2)
@@ -45,7 +48,8 @@ def interval(found: Spread, metric: Metric) -> str:
         return ""
     small = (found.high - found.low) / 1000
     ends = (0.0 if abs(end) < small else end for end in (found.low, found.high))
-    return f"[{', '.join(metric_value(end, metric) for end in ends)}]"
+    shown = (f"{100 * e:.0f}" if metric.bounded else metric_value(e, metric) for e in ends)
+    return f"[{', '.join(shown)}]"
 
 
 def spread(found: Spread | None, metric: Metric) -> Cell:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pytest_simbench.measure.gate import Change, GateReport
 from pytest_simbench.records.metrics import CRASHED
 from pytest_simbench.records.series import short
@@ -23,7 +25,7 @@ def columns(report: GateReport) -> list[Column]:
         return []
     found = [change for change, _ in rows]
     return [
-        Column("test", [short(change.test) for change in found], left=True, above=True),
+        Column("test", _tests(found), left=True, above=True),
         Column("metric", map(_name, found), left=True),
         Column("baseline", [_value(change, change.comparison.first) for change in found]),
         Column("now", [_value(change, change.comparison.second) for change in found]),
@@ -50,6 +52,13 @@ def _rows(report: GateReport) -> list[tuple[Change, str]]:
     ]
     tests = list(dict.fromkeys(change.test for change, _ in found))
     return sorted(found, key=lambda row: tests.index(row[0].test))
+
+
+def _tests(changes: Sequence[Change]) -> list[str]:
+    """Their tests, without file and class where that leaves all apart."""
+    shown = {change.test: short(change.test) for change in changes}
+    alone = len({*shown.values()}) == len(shown)
+    return [shown[change.test] if alone else change.test for change in changes]
 
 
 def _limited(change: Change) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean
 
-from pytest_simbench.measure.phenomena import KEPT, PhenomenonVerdict, Ratios, verdict, worst
+from pytest_simbench.measure.phenomena import KEPT, Miss, Misses, PhenomenonVerdict, verdict, worst
 from pytest_simbench.records.metrics import significant
 from pytest_simbench.records.phenomena import ordered
 from pytest_simbench.records.series import grouped
@@ -57,12 +57,12 @@ def sentences(summaries: Sequence[TaskSummary]) -> list[str]:
     profiles = list(dict.fromkeys(one.profile for one in every))
     for phenomenon, of in _by_phenomenon(summaries).items():
         for profile in profiles:
-            compared = {one.name: one for one in contenders(summaries, profile) if one.ratios(of)}
+            compared = {one.name: one for one in contenders(summaries, profile) if one.misses(of)}
             if len(compared) > 1:
-                ratios = {name: one.ratios(of) for name, one in compared.items()}
+                misses = {name: one.misses(of) for name, one in compared.items()}
                 costs = {name: one.cost(of) for name, one in compared.items()}
                 where = f" ({profile})" if len(profiles) > 1 else ""
-                found.append(f"for {phenomenon}{where}: {_told(verdict(ratios), costs)}")
+                found.append(f"for {phenomenon}{where}: {_told(verdict(misses), costs)}")
     return found
 
 
@@ -73,7 +73,7 @@ def table(summaries: Sequence[TaskSummary]) -> list[Column]:
     return [
         Column("simulator", [one.name for one in every], left=True),
         *(
-            Column(phenomenon, [_cell(one.ratios(of)) for one in every])
+            Column(phenomenon, [_cell(one.misses(of)) for one in every])
             for phenomenon, of in _by_phenomenon(summaries).items()
         ),
         Column("CPU s/sim s", [cells.MISSING if c is None else cells.number(c, 2) for c in costs]),
@@ -103,10 +103,10 @@ class Contender:
     profile: str
     rows: Mapping[str, Row]
 
-    def ratios(self, of: Sequence[TaskSummary]) -> Ratios:
+    def misses(self, of: Sequence[TaskSummary]) -> Misses:
         """Of these laws those that it was asked."""
-        found = {law.task: _ratio(self.rows[law.task]) for law in of if law.task in self.rows}
-        return {law: ratio for law, ratio in found.items() if ratio is not None}
+        found = {law.task: _miss(self.rows[law.task]) for law in of if law.task in self.rows}
+        return {law: miss for law, miss in found.items() if miss is not None}
 
     def cost(self, of: Sequence[TaskSummary]) -> float | None:
         """CPU seconds for a simulated second, the mean of these laws."""
@@ -135,18 +135,18 @@ def _by_phenomenon(summaries: Sequence[TaskSummary]) -> dict[str, list[TaskSumma
     return {phenomenon: found[phenomenon] for phenomenon in ordered(found)}
 
 
-def _ratio(row: Row) -> float | None:
+def _miss(row: Row) -> Miss | None:
     if row.failed:
-        return math.inf
-    found = row.metrics.get("ratio")
-    return None if found is None else found.max
+        return Miss(math.inf, math.inf)
+    ratio, error = row.metrics.get("ratio"), row.metrics.get("error")
+    return None if ratio is None else Miss(ratio.max, error.max if error else math.inf)
 
 
-def _cell(ratios: Ratios) -> str:
-    if not ratios:
+def _cell(misses: Misses) -> str:
+    if not misses:
         return cells.MISSING
-    kept = sum(ratio <= KEPT for ratio in ratios.values())
-    return f"{kept}/{len(ratios)} {_times(worst(ratios))}"
+    kept = sum(miss.ratio <= KEPT for miss in misses.values())
+    return f"{kept}/{len(misses)} {_times(worst(misses))}"
 
 
 def _times(ratio: float) -> str:
@@ -156,13 +156,12 @@ def _times(ratio: float) -> str:
 
 
 def _error(row: Row | None) -> str:
-    ratio = _ratio(row) if row else None
-    if row is None or ratio is None:
+    miss = _miss(row) if row else None
+    if miss is None:
         return cells.MISSING
-    error = row.metrics.get("error")
-    if math.isinf(ratio) or error is None:
+    if math.isinf(miss.error):
         return "fails"
-    return f"{error.max:.2g}" + (f" ({_times(ratio)})" if ratio > KEPT else "")
+    return f"{miss.error:.2g}" + (f" ({_times(miss.ratio)})" if miss.ratio > KEPT else "")
 
 
 def _unit(summary: TaskSummary) -> str:

@@ -52,6 +52,19 @@ def test_at_80_columns_it_is_one_table_in_which_tests_stand_above_their_metrics(
     assert_approved("terminal-changes", told.partition("\n\nFAILED")[0])
 
 
+def test_two_tests_of_one_name_are_told_apart() -> None:
+    def told(*files: str) -> set[str]:
+        side = [
+            record(repetition=k, test=f"{file}::test_f[a::b]", metrics={"placed": 1.0})
+            for file in files for k in range(20)
+        ]  # fmt: skip
+        limits = parse_limits("placed:5%", STACKING)
+        return {cell.text for cell in columns(run_gate(side, side, limits, METRICS))[0].cells}
+
+    assert told("a.py", "b.py") == {"a.py::test_f[a::b]", "b.py::test_f[a::b]"}
+    assert told("a.py") == {"test_f[a::b]"}
+
+
 def test_a_change_without_a_limit_is_called_worse_or_better_only_when_it_is_sure() -> None:
     worse = render_changes(compared(made(1.0, 3.0)), 120, False)
     assert line(worse, "untouched_moved").endswith("worse")

@@ -204,9 +204,14 @@ def test_any_number_is_its_own_and_never_a_power_of_ten(value: float, digits: in
         (2.0, CUBES, "2"),
         (0.0001, CUBES, "0.0001"),  # counts have no resolution: this is a mean of many
         (0.667, SHARE, "67"),
+        (0.9967, SHARE, "99.7"),  # not all of them
+        (0.99999, SHARE, "99.9"),
+        (0.0001, SHARE, "0.1"),
+        (1.0, SHARE, "100"),
+        (0.0, SHARE, "0"),
     ],
 )
-def test_what_is_far_below_the_resolution_is_nothing(
+def test_what_is_far_below_the_resolution_is_nothing_and_nearly_all_is_not_all(
     value: float, metric: Metric, shown: str
 ) -> None:
     assert metric_value(value, metric) == shown
