@@ -77,11 +77,13 @@ class MetricCourse:
     Attributes:
         values: of each release by seed; empty where no repetition has one.
         changes: supported change points; their places count releases that have values.
+        shown: whether a supported change shows in print, told or too small for that.
     """
 
     metric: Metric
     values: tuple[Mapping[int, float], ...]
     changes: tuple[ChangePoint, ...] = ()
+    shown: bool = False
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,9 @@ class TaskHistory(History):
                     + (f"p = {p:.2g}" if p else "every repetition is the same")
                 )
         if not found:
-            found.append("no change is supported by these repetitions")
+            small = ", ".join(course.metric.title for course in self.courses if course.shown)
+            what = f"only small changes of {small} are" if small else "no change is"
+            found.append(f"{what} supported by these repetitions")
         for release, result in zip(self.releases, self.results, strict=True):
             if result.crashed:
                 cause, records = next(iter(result.causes().items()))
@@ -186,10 +190,16 @@ def _changed(course: MetricCourse, rows: int, history: TaskHistory) -> MetricCou
     sides = zip(history.results, course.values, strict=True)
     sole = all(result.sole(course.metric) for result, values in sides if values)
     found = steps(present) if sole else change_points(present, rows=rows)
-    if course.metric.name in COSTS:
-        found = [c for c in found if abs(c.after - c.before) > SMALLEST * abs(c.before)]
-    found = [c for c in found if course.metric.differs(c.before, c.after)]
-    return replace(course, changes=tuple(found))
+    metric, told, shown, moved = course.metric, list[ChangePoint](), False, 0.0
+    least = SMALLEST if metric.name in COSTS else 0.0
+    for change in found:  # held against the last one told, or a little with each would be nothing
+        before, after = change.before - moved, change.after
+        moved = after - before
+        if abs(moved) > least * abs(before) and metric.differs(before, after):
+            told.append(replace(change, before=before))
+            moved = 0.0
+        shown = shown or metric.format(before) != metric.format(after)
+    return replace(course, changes=tuple(told), shown=shown)
 
 
 @dataclass(frozen=True)
