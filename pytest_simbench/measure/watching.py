@@ -55,9 +55,11 @@ Found = Iterator[tuple[bool, str]]
 
 
 def of_laws(step: Step, records: Sequence[Record]) -> Found:
-    """Which laws the release broke, mended or missed by more or less."""
-    for history in law_histories(records):
+    """Which laws the release broke, mended, missed by more or less, or does not run any more."""
+    for history in law_histories(records, fewest=1):
         yield from ((True, sentence) for sentence in history.changed(step.new))
+        if lost := ", ".join(history.lost(step.old, step.new)):
+            yield True, f"was kept, did not run: {lost}"
         if moved := ", ".join(history.moved(step.old, step.new)):
             yield False, f"kept by both, by one at least {FACTOR:g} times as closely: {moved}"
 

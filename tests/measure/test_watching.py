@@ -12,7 +12,7 @@ from pytest_simbench.measure.watching import Step, of_laws, of_scene, of_tasks
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
-from tests.measure.test_law_history import row
+from tests.measure.test_law_history import asked, row
 from tests.measure.test_settling import end
 from tests.records.build import failed, record
 from tests.tiny import Falling
@@ -30,6 +30,13 @@ def test_a_law_changes_with_the_release_that_changed_it() -> None:
         (False, "kept by both, by one at least 2 times as closely: spin (0.2x -> 0.001x)"),
     ]
     assert list(of_laws(Step("engine", "1.10", "2.0"), records)) == []
+
+
+def test_a_law_that_was_kept_and_does_not_run_any_more_is_a_change() -> None:
+    gone = [*asked("tower", "1.9", 0.5), *asked("slip", "1.9", 5.0), *asked("spin", "1.10", 0.5)]
+    told = [(True, "was kept, did not run: tower")]
+    assert list(of_laws(STEP, [*row("glide", 0.5, 0.5, 0.5, 0.5), *gone])) == told
+    assert list(of_laws(STEP, gone[:2])) == told  # no law ran at all
 
 
 def falls(version: str, *landed: float | None) -> list[Record]:
