@@ -45,7 +45,7 @@ def bisect_ends(search: Search) -> int:
     settled, ends = _ends(search, place - 1, place)
     print(*sentences(settled.only(ends)), sep="\n")
     print(f"results: {search.folder}")
-    if settled.moved and settled.explained(*ends) is None:
+    if settled.tried(*ends) is not None and settled.explained(*ends) is None:
         return 0
     print(f"so {releases[place]} is not shown to be the cause")
     return 1

@@ -87,7 +87,7 @@ class Settled:
 
     def noise(self, who: Who, moved: float) -> float | None:
         """How far any body ends from where it ends as written, with starts moved by so much [mm];
-        None where that was not tried."""
+        None where that was not tried, or none of them ended."""
         own, others = self.written[who], self.moved.get(moved, {}).get(who)
         if others is None:
             return None
@@ -120,9 +120,16 @@ class Settled:
     def _alike(self, ends: Mapping[Who, Ends], a: Who, b: Who) -> bool:
         return self.apart(ends[a], ends[b])[0] <= ALIKE
 
+    def tried(self, a: Who, b: Who) -> float | None:
+        """The largest move of the start of which both have an end [m]; None where there is none:
+        nobody knows what a moved start does."""
+        known = [m for m in self.moved if None not in (self.noise(a, m), self.noise(b, m))]
+        return max(known, default=None)
+
     def explained(self, a: Who, b: Who) -> float | None:
         """The smallest tried move of the start that moves an end of one of two simulators as far as
-        theirs are apart [m]; None where no move does, or none was tried."""
+        theirs are apart [m]; None where no move does, which is known as far as they were `tried`.
+        """
         gap = self.apart(self.written[a], self.written[b])[0]
         for moved in self.moved:
             if max(self.noise(who, moved) or 0.0 for who in (a, b)) >= gap:

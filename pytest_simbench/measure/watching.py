@@ -108,10 +108,11 @@ def of_scene(step: Step, name: str, records: Sequence[Record]) -> Found:
     if moved is not None:
         start = f"a start moved by {significant(1000 * moved)} mm"
         yield False, f"{told}; {start} does so within one release"
-    elif settled.moved:
+    elif settled.tried(before, after) is not None:
         yield True, f"{told}; no start that was moved does so"
     else:
-        yield False, f"{told}; no moved start was tried, so it may be noise"
+        how = "ended in both" if settled.moved else "was tried"
+        yield False, f"{told}; no moved start {how}, so it may be noise"
 
 
 def _task(test: str) -> str:

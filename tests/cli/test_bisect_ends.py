@@ -14,7 +14,7 @@ from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.records.folder import RunFolder
 from tests.approval import assert_approved_line
-from tests.measure.test_settling import end
+from tests.measure.test_settling import crashed, end
 
 RELEASES = ("1.8", "1.9", "1.10", "1.11", "1.12")
 
@@ -107,6 +107,16 @@ def test_what_has_no_cause(
     told = capsys.readouterr().out.replace(f"{tmp_path}", "DIR")
     assert_approved_line("bisect", told.replace("\n", " | "))
     assert ("first release" in told) == (last > 1)
+
+
+def test_a_release_whose_moved_starts_crashed_is_no_cause(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = search(tmp_path, 0.0, 0.4, 30.0, 31.0, 30.5)
+    for release in RELEASES:
+        RunFolder(tmp_path).append(crashed(f"sim=={release}", moved=1e-4))
+    assert bisect_ends(known) == 1
+    assert "No moved start ended in both, so nobody knows" in capsys.readouterr().out
 
 
 def test_a_release_that_crashed_and_a_scene_that_is_missing_are_told(tmp_path: Path) -> None:

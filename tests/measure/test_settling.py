@@ -73,11 +73,34 @@ def test_a_difference_that_a_moved_start_makes_too_is_noise() -> None:
         "A start moved by 1 mm moves the end within one simulator as far: the difference is the "
         "scene's own noise, and no cause can be told from it."
     )
-    third = one(*apart, *still, end("b", 21.0, moved=1e-3), end("c", 100.0))
+    more = [*apart, *still, end("b", 21.0, moved=1e-3), end("c", 100.0)]
+    third = one(*more, end("a", 0.0, moved=1e-3), end("c", 100.0, moved=1e-3))
     assert sentences(third)[1] == (
         "Of 3 pairs that differ, moved starts explain 1; the others differ by more than starts "
         "moved by up to 1 mm do."
     )
+    assert sentences(one(*more))[1] == (
+        "Of 3 pairs that differ, moved starts explain 1; of 2 nobody knows, since no moved start "
+        "ended in both."
+    )
+    assert sentences(one(*more, end("c", 100.0, moved=1e-3)))[1] == (
+        "Of 3 pairs that differ, moved starts explain 1; 1 differ by more than starts moved by up "
+        "to 1 mm do; of 1 nobody knows, since no moved start ended in both."
+    )
+
+
+def crashed(simulator: str, *more: float, **given: Any) -> Record:
+    """The same of a repetition that crashed, which has no end."""
+    return end(simulator, 0.0, *more, status="failed", details={}, metrics={}, **given)
+
+
+def test_moved_starts_that_crashed_are_no_sign_that_the_start_has_no_noise() -> None:
+    apart, moved = [end("a==1", 0.0), end("a==2", 10.0)], [crashed("a==2", moved=1e-4)]
+    for lost in [*moved, crashed("a==1", moved=1e-4)], [*moved, end("a==1", 0.0, moved=1e-4)]:
+        assert sentences(one(*apart, *lost))[1:3] == [
+            "2 moves the end by 10 mm: no moved start ended in both, so it may be noise.",
+            "No moved start ended in both, so nobody knows whether this is more than noise.",
+        ]
 
 
 def test_without_moved_starts_or_finer_steps_nobody_knows() -> None:

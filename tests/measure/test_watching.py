@@ -13,7 +13,7 @@ from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
 from tests.measure.test_law_history import asked, row
-from tests.measure.test_settling import end
+from tests.measure.test_settling import crashed, end
 from tests.records.build import failed, record
 from tests.tiny import Falling
 
@@ -106,3 +106,10 @@ def test_an_end_changes_where_the_scene_s_noise_does_not_explain_it(
             records += [] if moved is None else [end(name, x + moved, moved=1e-4)]
     expected = [(changed, f"a.xml: {text}") for changed, text in found]
     assert list(of_scene(STEP, "a.xml", records)) == expected
+
+
+def test_an_end_whose_moved_starts_crashed_is_no_change() -> None:
+    records = [end(STEP.names[0], 0.0), end(STEP.names[1], 30.0)]
+    records += [crashed(name, moved=1e-4) for name in STEP.names]
+    told = "a.xml: bowl ends 30 mm elsewhere; no moved start ended in both, so it may be noise"
+    assert list(of_scene(STEP, "a.xml", records)) == [(False, told)]

@@ -82,6 +82,8 @@ def _boundaries(found: Settled, releases: Sequence[Who]) -> list[str]:
         if gap > ALIKE:
             moved = found.explained(before, after)
             cause = "no start that was moved does so"
+            if found.tried(before, after) is None:
+                cause = "no moved start ended in both, so it may be noise"
             if moved is not None:
                 cause = f"a start moved by {_mm(1000 * moved)} does so within one release"
             which = VersionedName.of(after[0]).which
@@ -119,16 +121,23 @@ def _noise(found: Settled, pairs: Sequence[tuple[Who, Who]]) -> str:
             f"A start moved by {_mm(1000 * max(explained))} moves the end within one simulator as "
             "far: the difference is the scene's own noise, and no cause can be told from it."
         )
-    largest = max(found.moved)
-    if not explained:
+    rest = [found.tried(*pair) for pair in pairs if found.explained(*pair) is None]
+    known = [moved for moved in rest if moved is not None]
+    if not known and not explained:
+        return "No moved start ended in both, so nobody knows whether this is more than noise."
+    largest = _mm(1000 * min(known, default=0.0))
+    if len(known) == len(pairs):
         return (
-            f"Starts moved by up to {_mm(1000 * largest)} move no end so far: the difference is "
-            "more than the start's noise."
+            f"Starts moved by up to {largest} move no end so far: the difference is more than the "
+            "start's noise."
         )
-    return (
-        f"Of {len(pairs)} pairs that differ, moved starts explain {len(explained)}; the others "
-        f"differ by more than starts moved by up to {_mm(1000 * largest)} do."
-    )
+    told = [f"Of {len(pairs)} pairs that differ, moved starts explain {len(explained)}"]
+    if known:
+        others = "the others" if len(known) == len(rest) else f"{len(known)}"
+        told.append(f"{others} differ by more than starts moved by up to {largest} do")
+    if unknown := len(rest) - len(known):
+        told.append(f"of {unknown} nobody knows, since no moved start ended in both")
+    return "; ".join(told) + "."
 
 
 def _finer(found: Settled, known: dict[Who, str]) -> str:
