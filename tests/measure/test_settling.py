@@ -132,6 +132,17 @@ def test_a_finer_step_says_whether_the_difference_survives_and_who_is_not_conver
     )
 
 
+def test_who_crashed_at_the_finer_step_does_not_end_alike() -> None:
+    apart = [end("a", 0.0), end("b", 10.0), end("a", 0.1, 0.0005), crashed("b", 0.0005)]
+    assert sentences(one(*apart))[2] == (
+        "With steps 4 times as fine there is no end of b, and nothing is compared."
+    )
+    assert sentences(one(*apart, end("c", 5.0), end("c", 0.2, 0.0005)))[2] == (
+        "With steps 4 times as fine there is no end of b, and the others all end alike; the end of "
+        "c depends on the step, so it is not converged."
+    )
+
+
 def test_equal_ends_of_one_start_that_is_unstable_are_no_agreement() -> None:
     tried = [end("a", 25.0, moved=1e-4), end("b", 3.0, moved=1e-4), end("a", 90.0, moved=1e-3)]
     assert sentences(one(end("a", 0.0), end("b", 0.5), *tried)) == [

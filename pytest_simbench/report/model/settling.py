@@ -144,20 +144,27 @@ def _finer(found: Settled, known: dict[Who, str]) -> str:
     if not found.finer:
         return "No finer step was tried, so nobody knows whether an end is converged."
     finest = max(found.finer)
-    ends = found.finer[finest]
+    ends = {who: tried for who, tried in found.finer[finest].items() if who in known}
     groups = found.places(ends)
     if not groups:
         return f"With steps {finest} times as fine no repetition finished."
+    lost = [who for who in known if not any(who in group for group in groups)]
     moving = [
         who
         for who in found.written
         if (change := found.change(who, finest)) is not None and change > ALIKE
     ]
-    text = "they all end alike" if len(groups) == 1 else f"they still end in {len(groups)} ways"
+    how = "all end alike" if len(groups) == 1 else f"still end in {len(groups)} ways"
+    text = f"they {how}"
+    if lost:
+        others = f"the others {how}" if len(known) > len(lost) + 1 else "nothing is compared"
+        text = f"there is no end of {_some(_spans(lost, _releases(found), known))}, and {others}"
     if len(groups) > 1:
         gap = max(found.apart(ends[a], ends[b])[0] for a, b in _between(groups))
         text += f", up to {_mm(gap)} apart"
     text = f"With steps {finest} times as fine {text}"
+    if not moving and lost:
+        return f"{text}."
     if not moving:
         return f"{text}, where they ended before: the step is not to blame."
     told = _some(_spans(moving, _releases(found), known))
