@@ -3,6 +3,9 @@ bodies end elsewhere, and whether that release is the cause of it."""
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
+
 from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.measure.bisection import first_worse
@@ -55,7 +58,7 @@ def _ends(search: Search, *places: int) -> tuple[Settled, list[Who]]:
     """The scene, and some releases that have run, as it names them.
 
     Raises:
-        BadInput: no test, or several, left a scene to itself in them.
+        BadInput: no test, or several, left a scene to itself in them, or from no start in common.
     """
     names = [search.named(place) for place in places]
     found = settlings(RunFolder(search.folder).read().records)
@@ -71,4 +74,7 @@ def _ends(search: Search, *places: int) -> tuple[Settled, list[Who]]:
             f"{' and '.join(names)} need one end of {settled.scene} each, and have {len(who)}; see "
             "what crashed, and choose one mode and profile"
         )
+    gaps = [settled.apart(settled.written[a], settled.written[b])[0] for a, b in pairwise(who)]
+    if any(map(math.isnan, gaps)):
+        raise BadInput(f"no start ended in each of {' and '.join(names)}; see what crashed")
     return settled, who

@@ -6,6 +6,7 @@ moved a little within each, and the time step made finer.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -77,11 +78,11 @@ class Settled:
         )
 
     def apart(self, a: Ends, b: Ends) -> tuple[float, str]:
-        """How far apart the body lies that two ends have farthest apart [mm], and its name; 0 where
-        they have no start in common."""
+        """How far apart the body lies that two ends have farthest apart [mm], and its name; nan
+        where they have no start in common: nobody knows."""
         first, second = a.means, b.means
         gaps = [np.linalg.norm(first[k] - second[k], axis=1) for k in first.keys() & second.keys()]
-        widest = np.max(gaps, axis=0) if gaps else np.zeros(len(self.bodies))
+        widest = np.max(gaps, axis=0) if gaps else np.full(len(self.bodies), np.nan)
         worst = int(widest.argmax())
         return float(widest[worst]), self.bodies[worst]
 
@@ -101,11 +102,10 @@ class Settled:
 
     def change(self, who: Who, finer: int) -> float | None:
         """How far any body ends from where it ends as written, with a step so many times as fine
-        [mm]; None where that was not tried."""
+        [mm]; None where that was not tried, or they have no start in common."""
         other = self.finer.get(finer, {}).get(who)
-        if other is None or not len(other.places):
-            return None
-        return self.apart(self.written[who], other)[0]
+        gap = math.nan if other is None else self.apart(self.written[who], other)[0]
+        return None if math.isnan(gap) else gap
 
     def places(self, ends: Mapping[Who, Ends]) -> list[list[Who]]:
         """Simulators by where the bodies end: two that are alike are in one group, also through a

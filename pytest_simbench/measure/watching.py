@@ -7,6 +7,7 @@ of 5 %: a watch in which nothing changed tells of a change in at most one of twe
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -102,6 +103,9 @@ def of_scene(step: Step, name: str, records: Sequence[Record]) -> Found:
     (settled, before), (_, after) = (ends[simulator] for simulator in step.names)
     gap, body = settled.apart(settled.written[before], settled.written[after])
     if gap <= ALIKE:
+        return
+    if math.isnan(gap):
+        yield False, f"{name}: no start ended in both, so nobody knows whether it ends elsewhere"
         return
     told = f"{name}: {body} ends {significant(gap, 2)} mm elsewhere"
     moved = settled.explained(before, after)

@@ -14,7 +14,7 @@ from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.records.folder import RunFolder
 from tests.approval import assert_approved_line
-from tests.measure.test_settling import crashed, end
+from tests.measure.test_settling import at, crashed, end
 
 RELEASES = ("1.8", "1.9", "1.10", "1.11", "1.12")
 
@@ -126,3 +126,10 @@ def test_a_release_that_crashed_and_a_scene_that_is_missing_are_told(tmp_path: P
     (tmp_path / "records.jsonl").write_text("")
     with pytest.raises(BadInput, match=r"no scenes were left to themselves on sim==1.8 and sim=="):
         bisect_ends(known)
+
+
+def test_releases_that_ended_from_different_starts_are_not_told_apart(tmp_path: Path) -> None:
+    for seed, release in ((2, "1"), (3, "2")):
+        RunFolder(tmp_path).append(at(f"sim=={release}", seed, 0.0))
+    with pytest.raises(BadInput, match="no start ended in each of sim==1 and sim==2"):
+        bisect_ends(Recorded("sim", "ends", ("1", "2"), tmp_path, []))

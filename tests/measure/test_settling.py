@@ -175,13 +175,14 @@ def test_one_simulator_without_moved_starts_is_no_comparison() -> None:
     assert settlings([end("a", 0.0)]) == []
 
 
+def at(who: str, seed: int, x: float, moved: float = 0.0, step: float = 0.002) -> Record:
+    """The same from one of two stored starts."""
+    own = {**end(who, 0.0, step).settings, "task.starts": 2, "task.moved": moved}
+    return end(who, x, seed=seed, settings=own)
+
+
 def test_stored_starts_are_held_against_themselves_alone() -> None:
     """Two starts that are 500 mm apart on the table are no noise of 500 mm."""
-
-    def at(who: str, seed: int, x: float, moved: float = 0.0) -> Record:
-        own = {**end(who, 0.0).settings, "task.starts": 2, "task.moved": moved}
-        return end(who, x, seed=seed, settings=own)
-
     apart = [at("a", 2, 0.0), at("a", 3, 500.0), at("b", 2, 0.0), at("b", 3, 510.0)]
     moved = [at("a", 2, 0.1, 1e-4), at("a", 3, 500.2, 1e-4)]
     found = one(*apart, *moved)
@@ -190,6 +191,26 @@ def test_stored_starts_are_held_against_themselves_alone() -> None:
     assert found.noise(a, 1e-4) == pytest.approx(0.2)
     lost = one(*apart[:3], *moved)  # b has one start: the other one is not compared
     assert lost.apart(lost.written[a], lost.written[b])[0] == pytest.approx(0.0)
+
+
+def test_ends_of_different_starts_are_no_agreement() -> None:
+    found = one(
+        at("a", 2, 0.0), at("b", 3, 0.0), at("a", 2, 0.0, step=5e-4), at("b", 3, 0.0, step=5e-4)
+    )
+    assert sentences(found) == [
+        "As written, a; b have no start of bowl in common that ended, so nobody knows whether they "
+        "end alike.",
+        "With steps 4 times as fine they have no start in common, where they ended before: the "
+        "step is not to blame.",
+    ]
+    third = [at("a", 2, 0.0), at("b", 3, 0.0), at("c", 2, 9.0), at("a", 3, 0.0, step=5e-4)]
+    assert sentences(one(*third))[:2] == [
+        "As written, bowl ends in 3 ways: a; b; c. They differ by up to 9 mm (bowl, a and c).",
+        "Of 2 pairs more nobody knows, since no start ended in both.",
+    ]
+    assert sentences(one(*third))[-1] == (
+        "With steps 4 times as fine there is no end of b and c, and nothing is compared."
+    )
 
 
 def test_releases_are_told_as_spans_with_the_move_that_does_what_each_boundary_does() -> None:

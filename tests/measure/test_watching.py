@@ -13,7 +13,7 @@ from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
 from tests.measure.test_law_history import asked, row
-from tests.measure.test_settling import crashed, end
+from tests.measure.test_settling import at, crashed, end
 from tests.records.build import failed, record
 from tests.tiny import Falling
 
@@ -112,4 +112,10 @@ def test_an_end_whose_moved_starts_crashed_is_no_change() -> None:
     records = [end(STEP.names[0], 0.0), end(STEP.names[1], 30.0)]
     records += [crashed(name, moved=1e-4) for name in STEP.names]
     told = "a.xml: bowl ends 30 mm elsewhere; no moved start ended in both, so it may be noise"
+    assert list(of_scene(STEP, "a.xml", records)) == [(False, told)]
+
+
+def test_ends_of_different_starts_are_no_change() -> None:
+    told = "a.xml: no start ended in both, so nobody knows whether it ends elsewhere"
+    records = [at(STEP.names[0], 2, 0.0), at(STEP.names[1], 3, 30.0)]
     assert list(of_scene(STEP, "a.xml", records)) == [(False, told)]

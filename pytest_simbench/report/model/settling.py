@@ -38,20 +38,36 @@ def sentences(found: Settled) -> list[str]:
         groups = sorted(groups, key=lambda group: min(releases.index(who) for who in group))
     if len(groups) < 2:
         return [_alike(found, known), *_alone(found)]
-    pairs = _between(groups)
+    ways = "; ".join(_some(_spans(group, releases, known)) for group in groups)
+    pairs = _between(found, found.written, groups)
+    if not pairs:
+        return [
+            f"As written, {ways} have no start of {found.scene} in common that ended, so nobody "
+            "knows whether they end alike.",
+            _finer(found, known),
+        ]
     widest = max(pairs, key=lambda pair: found.apart(*(found.written[who] for who in pair))[0])
     gap, body = found.apart(*(found.written[who] for who in widest))
     told = [
-        f"As written, {found.scene} ends in {len(groups)} ways: "
-        + "; ".join(_some(_spans(group, releases, known)) for group in groups)
-        + f". They differ by up to {_mm(gap)} ({body}, {known[widest[0]]} and {known[widest[1]]})."
+        f"As written, {found.scene} ends in {len(groups)} ways: {ways}. They differ by up to "
+        f"{_mm(gap)} ({body}, {known[widest[0]]} and {known[widest[1]]})."
     ]
+    if unknown := sum(len(a) * len(b) for a, b in combinations(groups, 2)) - len(pairs):
+        told.append(f"Of {unknown} pairs more nobody knows, since no start ended in both.")
     return [*told, *_boundaries(found, releases), _noise(found, pairs), _finer(found, known)]
 
 
-def _between(groups: Sequence[Sequence[Who]]) -> list[tuple[Who, Who]]:
-    """Each two that are in different groups."""
-    return [(a, b) for first, second in combinations(groups, 2) for a in first for b in second]
+def _between(
+    found: Settled, ends: Mapping[Who, Ends], groups: Sequence[Sequence[Who]]
+) -> list[tuple[Who, Who]]:
+    """Each two that are in different groups and have a start in common."""
+    return [
+        (a, b)
+        for first, second in combinations(groups, 2)
+        for a in first
+        for b in second
+        if found.apart(ends[a], ends[b])[0] > ALIKE
+    ]
 
 
 def _releases(found: Settled) -> list[Who]:
@@ -149,21 +165,21 @@ def _finer(found: Settled, known: dict[Who, str]) -> str:
     if not groups:
         return f"With steps {finest} times as fine no repetition finished."
     lost = [who for who in known if not any(who in group for group in groups)]
-    moving = [
-        who
-        for who in found.written
-        if (change := found.change(who, finest)) is not None and change > ALIKE
-    ]
-    how = "all end alike" if len(groups) == 1 else f"still end in {len(groups)} ways"
+    pairs = _between(found, ends, groups)
+    changes = {who: found.change(who, finest) for who in known}
+    moving = [who for who, change in changes.items() if change is not None and change > ALIKE]
+    how = f"still end in {len(groups)} ways" if pairs else "have no start in common"
+    if len(groups) == 1:
+        how = "all end alike"
     text = f"they {how}"
     if lost:
         others = f"the others {how}" if len(known) > len(lost) + 1 else "nothing is compared"
         text = f"there is no end of {_some(_spans(lost, _releases(found), known))}, and {others}"
-    if len(groups) > 1:
-        gap = max(found.apart(ends[a], ends[b])[0] for a, b in _between(groups))
+    if pairs:
+        gap = max(found.apart(ends[a], ends[b])[0] for a, b in pairs)
         text += f", up to {_mm(gap)} apart"
     text = f"With steps {finest} times as fine {text}"
-    if not moving and lost:
+    if not moving and None in changes.values():
         return f"{text}."
     if not moving:
         return f"{text}, where they ended before: the step is not to blame."
