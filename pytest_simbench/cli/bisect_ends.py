@@ -11,7 +11,7 @@ from pytest_simbench.cli.values import BadInput
 from pytest_simbench.measure.bisection import first_worse
 from pytest_simbench.measure.settling import ALIKE, Settled, settlings
 from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.records.record import Who
+from pytest_simbench.records.series import Configured
 from pytest_simbench.report.model.settling import sentences
 
 
@@ -54,7 +54,7 @@ def bisect_ends(search: Search) -> int:
     return 1
 
 
-def _ends(search: Search, *places: int) -> tuple[Settled, list[Who]]:
+def _ends(search: Search, *places: int) -> tuple[Settled, list[Configured]]:
     """The scene, and some releases that have run, as it names them.
 
     Raises:

@@ -18,8 +18,8 @@ from pytest_simbench.measure.limits import Limit
 from pytest_simbench.measure.settling import ALIKE, Settled, settlings
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import significant
-from pytest_simbench.records.record import Record, Who
-from pytest_simbench.records.series import side_by_side
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import Configured, side_by_side
 
 DIRECTIONS = {"worse": False, "better": True}
 """In each the later release is gated; *better* with the two releases exchanged."""
@@ -91,7 +91,7 @@ def of_tasks(step: Step, run: RunContents, limits: Sequence[Limit], steps: int) 
 def of_scene(step: Step, name: str, records: Sequence[Record]) -> Found:
     """Whether the bodies of a scene end elsewhere, and whether the scene's own noise explains it;
     also where a release does not run it any more."""
-    ends: dict[str, tuple[Settled, Who]] = {
+    ends: dict[str, tuple[Settled, Configured]] = {
         who[0]: (settled, who) for settled in settlings(records) for who in settled.written
     }
     if not ends.keys() >= {*step.names}:

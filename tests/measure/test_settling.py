@@ -3,6 +3,7 @@ with finer steps; from planted records, and the sentences made of them."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from pytest_simbench.report.model.settling import section, sentences
 from tests.records.build import record
 
 MODE = ("headless", "tuned")
+A = ("a", *MODE)
 
 
 def end(
@@ -169,6 +171,20 @@ def test_a_crash_is_told_and_other_scenes_stay_apart() -> None:
     for key in ("task.scene", "task.scene_digest", "task.seconds", "task.starts"):
         other = {"settings": {**end("a", 0).settings, key: 3}}
         assert len(settlings([*records[1:3], *(end(who, 3.0, **other) for who in "ab")])) == 2
+
+
+def test_each_configuration_has_ends_of_its_own() -> None:
+    """Their mean would be the end of neither."""
+    records = [
+        replace(r, settings={**r.settings, "iterations": k})
+        for k, x in ((10, 0.0), (100, 30.0))
+        for r in (end("a", x), end("a", x, 0.0005), end("a", x + 2, moved=1e-3))
+    ]
+    found = one(*records, end("b", 15.0))
+    assert list(found.written) == [(*A, "iterations=10"), (*A, "iterations=100"), ("b", *MODE)]
+    told = [[cell.text for cell in one.cells] for one in section(found).tables[0].columns]
+    assert told[0] == ["a (iterations=10)", "a (iterations=100)", "b"]
+    assert told[2:4] == [["100 % 2", "0 % 2", "-"], ["100 % 0", "0 % 0", "-"]]
 
 
 def test_one_simulator_without_moved_starts_is_no_comparison() -> None:

@@ -8,7 +8,7 @@ from itertools import combinations, groupby, pairwise
 from pytest_simbench.ground.versions import RELEASE, VersionedName, release_numbers
 from pytest_simbench.measure.settling import ALIKE, Ends, Settled
 from pytest_simbench.records.metrics import significant
-from pytest_simbench.records.record import Who
+from pytest_simbench.records.series import Configured
 from pytest_simbench.report.model import cells
 from pytest_simbench.report.model.document import Column, Section, Table, listed, names
 
@@ -58,8 +58,8 @@ def sentences(found: Settled) -> list[str]:
 
 
 def _between(
-    found: Settled, ends: Mapping[Who, Ends], groups: Sequence[Sequence[Who]]
-) -> list[tuple[Who, Who]]:
+    found: Settled, ends: Mapping[Configured, Ends], groups: Sequence[Sequence[Configured]]
+) -> list[tuple[Configured, Configured]]:
     """Each two that are in different groups and have a start in common."""
     return [
         (a, b)
@@ -70,7 +70,7 @@ def _between(
     ]
 
 
-def _releases(found: Settled) -> list[Who]:
+def _releases(found: Settled) -> list[Configured]:
     """Who is compared, oldest first, where all are releases of one simulator; else nobody."""
     named = [VersionedName.of(who[0]) for who in found.written]
     alone = len({name.base for name in named}) == len({who[1:] for who in found.written}) == 1
@@ -79,7 +79,9 @@ def _releases(found: Settled) -> list[Who]:
     return sorted(found.written, key=lambda who: release_numbers(VersionedName.of(who[0]).which))
 
 
-def _spans(group: Sequence[Who], releases: Sequence[Who], known: Mapping[Who, str]) -> list[str]:
+def _spans(
+    group: Sequence[Configured], releases: Sequence[Configured], known: Mapping[Configured, str]
+) -> list[str]:
     """Names of a group; of releases without a gap the first and the last one."""
     if not releases:
         return [known[who] for who in group]
@@ -90,7 +92,7 @@ def _spans(group: Sequence[Who], releases: Sequence[Who], known: Mapping[Who, st
     ]
 
 
-def _boundaries(found: Settled, releases: Sequence[Who]) -> list[str]:
+def _boundaries(found: Settled, releases: Sequence[Configured]) -> list[str]:
     """Where the end moves from one release to the next, and what moved start does the same."""
     told = []
     for before, after in pairwise(releases):
@@ -107,7 +109,7 @@ def _boundaries(found: Settled, releases: Sequence[Who]) -> list[str]:
     return told
 
 
-def _alike(found: Settled, known: dict[Who, str]) -> str:
+def _alike(found: Settled, known: dict[Configured, str]) -> str:
     if len(known) < 2:
         return f"{found.scene} ran in {''.join(known.values())} alone, so nothing is compared."
     return f"As written, {found.scene} ends alike in all {len(known)}, within {_mm(ALIKE)}."
@@ -128,7 +130,7 @@ def _alone(found: Settled) -> list[str]:
     ]
 
 
-def _noise(found: Settled, pairs: Sequence[tuple[Who, Who]]) -> str:
+def _noise(found: Settled, pairs: Sequence[tuple[Configured, Configured]]) -> str:
     if not found.moved:
         return "No moved start was tried, so nobody knows whether this is more than noise."
     explained = [moved for pair in pairs if (moved := found.explained(*pair)) is not None]
@@ -156,7 +158,7 @@ def _noise(found: Settled, pairs: Sequence[tuple[Who, Who]]) -> str:
     return "; ".join(told) + "."
 
 
-def _finer(found: Settled, known: dict[Who, str]) -> str:
+def _finer(found: Settled, known: dict[Configured, str]) -> str:
     if not found.finer:
         return "No finer step was tried, so nobody knows whether an end is converged."
     finest = max(found.finer)
