@@ -3,12 +3,15 @@ bodies end elsewhere, and whether that release is the cause of it."""
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
+
 from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.measure.bisection import first_worse
 from pytest_simbench.measure.settling import ALIKE, Settled, settlings
 from pytest_simbench.records.folder import RunFolder
-from pytest_simbench.records.record import Who
+from pytest_simbench.records.series import Configured
 from pytest_simbench.report.model.settling import sentences
 
 
@@ -45,17 +48,17 @@ def bisect_ends(search: Search) -> int:
     settled, ends = _ends(search, place - 1, place)
     print(*sentences(settled.only(ends)), sep="\n")
     print(f"results: {search.folder}")
-    if settled.moved and settled.explained(*ends) is None:
+    if settled.tried(*ends) is not None and settled.explained(*ends) is None:
         return 0
     print(f"so {releases[place]} is not shown to be the cause")
     return 1
 
 
-def _ends(search: Search, *places: int) -> tuple[Settled, list[Who]]:
+def _ends(search: Search, *places: int) -> tuple[Settled, list[Configured]]:
     """The scene, and some releases that have run, as it names them.
 
     Raises:
-        BadInput: no test, or several, left a scene to itself in them.
+        BadInput: no test, or several, left a scene to itself in them, or from no start in common.
     """
     names = [search.named(place) for place in places]
     found = settlings(RunFolder(search.folder).read().records)
@@ -71,4 +74,7 @@ def _ends(search: Search, *places: int) -> tuple[Settled, list[Who]]:
             f"{' and '.join(names)} need one end of {settled.scene} each, and have {len(who)}; see "
             "what crashed, and choose one mode and profile"
         )
+    gaps = [settled.apart(settled.written[a], settled.written[b])[0] for a, b in pairwise(who)]
+    if any(map(math.isnan, gaps)):
+        raise BadInput(f"no start ended in each of {' and '.join(names)}; see what crashed")
     return settled, who

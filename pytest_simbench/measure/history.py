@@ -77,11 +77,13 @@ class MetricCourse:
     Attributes:
         values: of each release by seed; empty where no repetition has one.
         changes: supported change points; their places count releases that have values.
+        shown: whether a supported change shows in print, told or too small for that.
     """
 
     metric: Metric
     values: tuple[Mapping[int, float], ...]
     changes: tuple[ChangePoint, ...] = ()
+    shown: bool = False
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,9 @@ class TaskHistory(History):
                     + (f"p = {p:.2g}" if p else "every repetition is the same")
                 )
         if not found:
-            found.append("no change is supported by these repetitions")
+            small = ", ".join(course.metric.title for course in self.courses if course.shown)
+            what = f"only small changes of {small} are" if small else "no change is"
+            found.append(f"{what} supported by these repetitions")
         for release, result in zip(self.releases, self.results, strict=True):
             if result.crashed:
                 cause, records = next(iter(result.causes().items()))
@@ -186,10 +190,16 @@ def _changed(course: MetricCourse, rows: int, history: TaskHistory) -> MetricCou
     sides = zip(history.results, course.values, strict=True)
     sole = all(result.sole(course.metric) for result, values in sides if values)
     found = steps(present) if sole else change_points(present, rows=rows)
-    if course.metric.name in COSTS:
-        found = [c for c in found if abs(c.after - c.before) > SMALLEST * abs(c.before)]
-    found = [c for c in found if course.metric.differs(c.before, c.after)]
-    return replace(course, changes=tuple(found))
+    metric, told, shown, moved = course.metric, list[ChangePoint](), False, 0.0
+    least = SMALLEST if metric.name in COSTS else 0.0
+    for change in found:  # held against the last one told, or a little with each would be nothing
+        before, after = change.before - moved, change.after
+        moved = after - before
+        if abs(moved) > least * abs(before) and metric.differs(before, after):
+            told.append(replace(change, before=before))
+            moved = 0.0
+        shown = shown or metric.format(before) != metric.format(after)
+    return replace(course, changes=tuple(told), shown=shown)
 
 
 @dataclass(frozen=True)
@@ -256,15 +266,21 @@ class LawHistory(History):
             if self.releases[place] == release
         ]
 
+    def _sides(self, old: str, new: str) -> list[tuple[str, Reached | None, Reached | None]]:
+        """What two releases, which may have run none, reached, by the names of the laws."""
+        rows = [(law.name, dict(zip(self.releases, law.reached, strict=True))) for law in self.laws]
+        return [(name, of.get(old), of.get(new)) for name, of in rows]
+
+    def lost(self, old: str, new: str) -> list[str]:
+        """Laws that the old release keeps and the new one did not run."""
+        sides = self._sides(old, new)
+        return [name for name, before, now in sides if before and not now and before.most <= KEPT]
+
     def moved(self, old: str, new: str) -> list[str]:
         """Laws that two releases keep, one of them `FACTOR` times as closely."""
-        pairs = [
-            (law.name, law.reached[self.releases.index(old)], law.reached[self.releases.index(new)])
-            for law in self.laws
-        ]
         return [
             f"{name} ({times(before)} -> {times(now)})"
-            for name, before, now in pairs
+            for name, before, now in self._sides(old, new)
             if before
             and now
             and KEPT >= max(before.most, now.most) > CLOSE
@@ -282,9 +298,10 @@ class LawHistory(History):
         kept = [law for law in self.laws if all(r is None or r.most <= KEPT for r in law.reached)]
         missed = [law.name for law in self.laws
                   if all(r is None or r.least > BROKEN for r in law.reached)]  # fmt: skip
-        found.append(f"kept by all: {len(kept)} of {len(self.laws)} laws")
+        ran = " that ran it" if any(None in law.reached for law in self.laws) else ""
+        found.append(f"kept by all{ran}: {len(kept)} of {len(self.laws)} laws")
         if missed:
-            found.append(f"broken by all: {', '.join(missed)}")
+            found.append(f"broken by all{ran}: {', '.join(missed)}")
         return found
 
     def _alike(self, place: int) -> bool:
@@ -293,8 +310,8 @@ class LawHistory(History):
         return all(a and b and a.errors and a.errors == b.errors for a, b in pairs)
 
 
-def law_histories(records: Iterable[Record]) -> list[LawHistory]:
-    """The histories of laws in a run: of each simulator with two or more releases and builds."""
+def law_histories(records: Iterable[Record], fewest: int = FEWEST_OF_LAWS) -> list[LawHistory]:
+    """The histories of laws in a run: of each simulator with so many releases and builds."""
     versions = (r for r in records if VersionedName.of(r.simulator).kind)
     ended = (r for r in versions if r.status != "interrupted")
     every = by_release(r for r in ended if r.settings.get(PHENOMENON))
@@ -302,7 +319,7 @@ def law_histories(records: Iterable[Record]) -> list[LawHistory]:
     for of, laws in grouped(every, lambda at: at[1]._replace(parameters="")).items():
         known = {label for law in laws for label in every[law]}
         releases = sorted(known, key=lambda label: (label[0] == BUILD, release_numbers(label)))
-        if len(releases) >= FEWEST_OF_LAWS:
+        if len(releases) >= fewest:
             tasks = [task for task, _ in laws]
             rows = [
                 LawRow(

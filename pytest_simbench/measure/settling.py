@@ -6,14 +6,15 @@ moved a little within each, and the time step made finer.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pytest_simbench.records.record import Record, Who
-from pytest_simbench.records.series import grouped, settled
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import Configured, configured, grouped, settled
 
 TASK = "settling"
 """The task whose records these are (`tasks.settling`)."""
@@ -58,15 +59,15 @@ class Settled:
 
     scene: str
     bodies: Sequence[str]
-    written: Mapping[Who, Ends]
-    moved: Mapping[float, Mapping[Who, Ends]]
-    finer: Mapping[int, Mapping[Who, Ends]]
-    cost: Mapping[Who, float | None]
+    written: Mapping[Configured, Ends]
+    moved: Mapping[float, Mapping[Configured, Ends]]
+    finer: Mapping[int, Mapping[Configured, Ends]]
+    cost: Mapping[Configured, float | None]
 
-    def only(self, chosen: Sequence[Who]) -> Settled:
+    def only(self, chosen: Sequence[Configured]) -> Settled:
         """The same of some simulators alone."""
 
-        def among(ends: Mapping[Who, Ends]) -> dict[Who, Ends]:
+        def among(ends: Mapping[Configured, Ends]) -> dict[Configured, Ends]:
             return {who: ends[who] for who in chosen if who in ends}
 
         return replace(
@@ -77,17 +78,17 @@ class Settled:
         )
 
     def apart(self, a: Ends, b: Ends) -> tuple[float, str]:
-        """How far apart the body lies that two ends have farthest apart [mm], and its name; 0 where
-        they have no start in common."""
+        """How far apart the body lies that two ends have farthest apart [mm], and its name; nan
+        where they have no start in common: nobody knows."""
         first, second = a.means, b.means
         gaps = [np.linalg.norm(first[k] - second[k], axis=1) for k in first.keys() & second.keys()]
-        widest = np.max(gaps, axis=0) if gaps else np.zeros(len(self.bodies))
+        widest = np.max(gaps, axis=0) if gaps else np.full(len(self.bodies), np.nan)
         worst = int(widest.argmax())
         return float(widest[worst]), self.bodies[worst]
 
-    def noise(self, who: Who, moved: float) -> float | None:
+    def noise(self, who: Configured, moved: float) -> float | None:
         """How far any body ends from where it ends as written, with starts moved by so much [mm];
-        None where that was not tried."""
+        None where that was not tried, or none of them ended."""
         own, others = self.written[who], self.moved.get(moved, {}).get(who)
         if others is None:
             return None
@@ -99,30 +100,36 @@ class Settled:
         ]
         return max(ways, default=None)
 
-    def change(self, who: Who, finer: int) -> float | None:
+    def change(self, who: Configured, finer: int) -> float | None:
         """How far any body ends from where it ends as written, with a step so many times as fine
-        [mm]; None where that was not tried."""
+        [mm]; None where that was not tried, or they have no start in common."""
         other = self.finer.get(finer, {}).get(who)
-        if other is None or not len(other.places):
-            return None
-        return self.apart(self.written[who], other)[0]
+        gap = math.nan if other is None else self.apart(self.written[who], other)[0]
+        return None if math.isnan(gap) else gap
 
-    def places(self, ends: Mapping[Who, Ends]) -> list[list[Who]]:
+    def places(self, ends: Mapping[Configured, Ends]) -> list[list[Configured]]:
         """Simulators by where the bodies end: two that are alike are in one group, also through a
         third one. The largest group comes first."""
-        groups: list[list[Who]] = []
+        groups: list[list[Configured]] = []
         for who in (who for who, found in ends.items() if len(found.places)):
             near = [g for g in groups if any(self._alike(ends, who, other) for other in g)]
             groups = [g for g in groups if g not in near]
             groups.append([*(other for g in near for other in g), who])
         return sorted(groups, key=len, reverse=True)
 
-    def _alike(self, ends: Mapping[Who, Ends], a: Who, b: Who) -> bool:
+    def _alike(self, ends: Mapping[Configured, Ends], a: Configured, b: Configured) -> bool:
         return self.apart(ends[a], ends[b])[0] <= ALIKE
 
-    def explained(self, a: Who, b: Who) -> float | None:
+    def tried(self, a: Configured, b: Configured) -> float | None:
+        """The largest move of the start of which both have an end [m]; None where there is none:
+        nobody knows what a moved start does."""
+        known = [m for m in self.moved if None not in (self.noise(a, m), self.noise(b, m))]
+        return max(known, default=None)
+
+    def explained(self, a: Configured, b: Configured) -> float | None:
         """The smallest tried move of the start that moves an end of one of two simulators as far as
-        theirs are apart [m]; None where no move does, or none was tried."""
+        theirs are apart [m]; None where no move does, which is known as far as they were `tried`.
+        """
         gap = self.apart(self.written[a], self.written[b])[0]
         for moved in self.moved:
             if max(self.noise(who, moved) or 0.0 for who in (a, b)) >= gap:
@@ -151,26 +158,22 @@ def _settled(records: Sequence[Record]) -> Settled | None:
     if done is None:
         return None
     bodies = list(done.details["places"])
-    steps: dict[Who, float] = {}
-    for record in records:
-        if _moved(record) == 0:
-            steps[record.who] = max(steps.get(record.who, 0.0), _step(record))
-    written: dict[Who, Ends] = {}
-    moved: dict[float, dict[Who, Ends]] = {}
-    finer: dict[int, dict[Who, Ends]] = {}
-    cost: dict[Who, float | None] = {}
-    groups = grouped(records, lambda r: (r.who, _moved(r), _step(r)))
-    for (who, amount, step), group in groups.items():
-        if who not in steps:
-            continue
-        ends, times = _ends(group, bodies), round(steps[who] / step) if step else 1
-        if amount:
-            moved.setdefault(amount, {})[who] = ends
-        elif times > 1:
-            finer.setdefault(times, {})[who] = ends
-        else:
-            written[who] = ends
-            cost[who] = next((c for r in group if (c := r.cost("cpu_cost")) is not None), None)
+    written: dict[Configured, Ends] = {}
+    moved: dict[float, dict[Configured, Ends]] = {}
+    finer: dict[int, dict[Configured, Ends]] = {}
+    cost: dict[Configured, float | None] = {}
+    for who, own in configured(records, _start_and_step).items():
+        groups = grouped(own, _start_and_step)
+        steps = [step for amount, step in groups if not amount]
+        for (amount, step), group in groups.items() if steps else ():
+            ends, times = _ends(group, bodies), round(max(steps) / step) if step else 1
+            if amount:
+                moved.setdefault(amount, {})[who] = ends
+            elif times > 1:
+                finer.setdefault(times, {})[who] = ends
+            else:
+                written[who] = ends
+                cost[who] = next((c for r in group if (c := r.cost("cpu_cost")) is not None), None)
     written = {who: ends for who, ends in written.items() if len(ends.places)}
     if not written or (len(written) < 2 and not moved):
         return None
@@ -197,9 +200,7 @@ def _ends(records: Sequence[Record], bodies: Sequence[str]) -> Ends:
     )
 
 
-def _moved(record: Record) -> float:
-    return float(record.settings.get("task.moved") or 0.0)
-
-
-def _step(record: Record) -> float:
-    return float(record.settings.get("timestep") or 0.0)
+def _start_and_step(record: Record) -> tuple[float, float]:
+    """By how much the start was moved, and the time step."""
+    moved, step = (record.settings.get(key) for key in ("task.moved", "timestep"))
+    return float(moved or 0.0), float(step or 0.0)

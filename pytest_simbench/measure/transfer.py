@@ -50,8 +50,8 @@ from numpy.typing import NDArray
 from pytest_simbench.measure.comparison import ALPHA, holm
 from pytest_simbench.measure.intervals import CONFIDENCE, FEWEST, SEED, Interval
 from pytest_simbench.records.configuration import TASK, text
-from pytest_simbench.records.record import Record, Who, plain
-from pytest_simbench.records.series import RowKey, grouped
+from pytest_simbench.records.record import Record, plain
+from pytest_simbench.records.series import Configured, RowKey, configured, grouped
 
 METRIC, POLICY = "success", f"{TASK}policy"
 """The metric, and the parameter of the task that names the policy. Others of a policy begin with
@@ -170,9 +170,9 @@ class Transfer:
 
     task: str
     policies: Sequence[str]
-    simulators: Sequence[Who]
+    simulators: Sequence[Configured]
     outcomes: Array
-    left_out: Sequence[Who] = ()
+    left_out: Sequence[Configured] = ()
     lone: Sequence[str] = ()
 
     @property
@@ -257,7 +257,7 @@ def narrow(found: Interval) -> bool:
 
 
 def transfers(records: Iterable[Record]) -> list[Transfer]:
-    """Of each task that policies do: those of two policies and two simulators at least."""
+    """Of each task that policies do: those of two policies and two configurations at least."""
     own = [r for r in records if POLICY in r.settings and not r.swept]
     own.sort(key=lambda r: RowKey.of(r).order)
     return [found for group in grouped(own, _work).values() if (found := _transfer(group))]
@@ -270,15 +270,20 @@ def _work(record: Record) -> tuple[Any, ...]:
     return record.task, text(same), record.robot.get("name"), record.jitter
 
 
+def _policy(record: Record) -> tuple[Any, Any]:
+    """Its name, and what tells apart two of one name."""
+    return record.settings[POLICY], record.settings.get(DIGEST)
+
+
 def _transfer(records: Sequence[Record]) -> Transfer | None:
     """Policies come in the order of their success in all simulators."""
-    found: dict[Who, dict[str, dict[int, float]]] = {}
-    names = {(r.settings[POLICY], r.settings.get(DIGEST)) for r in records}
-    twice = Counter(name for name, _ in names)
-    for r in records:
+    found: dict[Configured, dict[str, dict[int, float]]] = {}
+    twice = Counter(name for name, _ in set(map(_policy, records)))
+    told = [(who, r) for who, own in configured(records, _policy).items() for r in own]
+    for who, r in told:
         value = 0.0 if r.status == "failed" else r.metrics.get(METRIC)
         if r.status != "interrupted" and value is not None:
-            of = found.setdefault(r.who, {})
+            of = found.setdefault(who, {})
             name = str(r.settings[POLICY])
             name += f" {str(r.settings.get(DIGEST))[:6]}" if twice[name] > 1 else ""
             of.setdefault(name, {})[r.seed] = float(value)

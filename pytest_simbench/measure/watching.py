@@ -7,6 +7,7 @@ of 5 %: a watch in which nothing changed tells of a change in at most one of twe
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -17,8 +18,8 @@ from pytest_simbench.measure.limits import Limit
 from pytest_simbench.measure.settling import ALIKE, Settled, settlings
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import significant
-from pytest_simbench.records.record import Record, Who
-from pytest_simbench.records.series import side_by_side
+from pytest_simbench.records.record import Record
+from pytest_simbench.records.series import Configured, side_by_side
 
 DIRECTIONS = {"worse": False, "better": True}
 """In each the later release is gated; *better* with the two releases exchanged."""
@@ -55,9 +56,11 @@ Found = Iterator[tuple[bool, str]]
 
 
 def of_laws(step: Step, records: Sequence[Record]) -> Found:
-    """Which laws the release broke, mended or missed by more or less."""
-    for history in law_histories(records):
+    """Which laws the release broke, mended, missed by more or less, or does not run any more."""
+    for history in law_histories(records, fewest=1):
         yield from ((True, sentence) for sentence in history.changed(step.new))
+        if lost := ", ".join(history.lost(step.old, step.new)):
+            yield True, f"was kept, did not run: {lost}"
         if moved := ", ".join(history.moved(step.old, step.new)):
             yield False, f"kept by both, by one at least {FACTOR:g} times as closely: {moved}"
 
@@ -88,7 +91,7 @@ def of_tasks(step: Step, run: RunContents, limits: Sequence[Limit], steps: int) 
 def of_scene(step: Step, name: str, records: Sequence[Record]) -> Found:
     """Whether the bodies of a scene end elsewhere, and whether the scene's own noise explains it;
     also where a release does not run it any more."""
-    ends: dict[str, tuple[Settled, Who]] = {
+    ends: dict[str, tuple[Settled, Configured]] = {
         who[0]: (settled, who) for settled in settlings(records) for who in settled.written
     }
     if not ends.keys() >= {*step.names}:
@@ -101,15 +104,19 @@ def of_scene(step: Step, name: str, records: Sequence[Record]) -> Found:
     gap, body = settled.apart(settled.written[before], settled.written[after])
     if gap <= ALIKE:
         return
+    if math.isnan(gap):
+        yield False, f"{name}: no start ended in both, so nobody knows whether it ends elsewhere"
+        return
     told = f"{name}: {body} ends {significant(gap, 2)} mm elsewhere"
     moved = settled.explained(before, after)
     if moved is not None:
         start = f"a start moved by {significant(1000 * moved)} mm"
         yield False, f"{told}; {start} does so within one release"
-    elif settled.moved:
+    elif settled.tried(before, after) is not None:
         yield True, f"{told}; no start that was moved does so"
     else:
-        yield False, f"{told}; no moved start was tried, so it may be noise"
+        how = "ended in both" if settled.moved else "was tried"
+        yield False, f"{told}; no moved start {how}, so it may be noise"
 
 
 def _task(test: str) -> str:

@@ -178,6 +178,23 @@ def labels(runs: Sequence[Sequence[Sequence[Record]]]) -> list[list[str]]:
     return [[" ".join(_difference(k, one.get(k)) for k in keys) for one in run] for run in every]
 
 
+Configured = tuple[str, ...]
+"""Simulator, mode, profile, and where there are several what tells its configuration apart."""
+
+
+def configured(
+    records: Iterable[Record], run: Callable[[Record], object]
+) -> dict[Configured, list[Record]]:
+    """Records by who did them, those of several configurations apart: what differs within one run
+    tells them apart in all, and in what else runs differ counts for nothing."""
+    found: dict[Configured, list[Record]] = {}
+    for who, own in grouped(records, lambda r: r.who).items():
+        runs = [configurations(of_one) for of_one in grouped(own, run).values()]
+        for group, label in zip(chain(*runs), chain(*labels(runs)), strict=True):
+            found.setdefault((*who, label) if label else who, []).extend(group)
+    return found
+
+
 MOST = 3
 """Differences that a row's name lists."""
 

@@ -14,7 +14,7 @@ from pytest_simbench.cli.search import Search
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.records.folder import RunFolder
 from tests.approval import assert_approved_line
-from tests.measure.test_settling import end
+from tests.measure.test_settling import at, crashed, end
 
 RELEASES = ("1.8", "1.9", "1.10", "1.11", "1.12")
 
@@ -109,6 +109,16 @@ def test_what_has_no_cause(
     assert ("first release" in told) == (last > 1)
 
 
+def test_a_release_whose_moved_starts_crashed_is_no_cause(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = search(tmp_path, 0.0, 0.4, 30.0, 31.0, 30.5)
+    for release in RELEASES:
+        RunFolder(tmp_path).append(crashed(f"sim=={release}", moved=1e-4))
+    assert bisect_ends(known) == 1
+    assert "No moved start ended in both, so nobody knows" in capsys.readouterr().out
+
+
 def test_a_release_that_crashed_and_a_scene_that_is_missing_are_told(tmp_path: Path) -> None:
     known = search(tmp_path, 0.0, 1.0, 2.0, 3.0, 40.0)
     with pytest.raises(BadInput, match=r"1.8 and sim==2 need one end of bowl each, and have 1"):
@@ -116,3 +126,10 @@ def test_a_release_that_crashed_and_a_scene_that_is_missing_are_told(tmp_path: P
     (tmp_path / "records.jsonl").write_text("")
     with pytest.raises(BadInput, match=r"no scenes were left to themselves on sim==1.8 and sim=="):
         bisect_ends(known)
+
+
+def test_releases_that_ended_from_different_starts_are_not_told_apart(tmp_path: Path) -> None:
+    for seed, release in ((2, "1"), (3, "2")):
+        RunFolder(tmp_path).append(at(f"sim=={release}", seed, 0.0))
+    with pytest.raises(BadInput, match="no start ended in each of sim==1 and sim==2"):
+        bisect_ends(Recorded("sim", "ends", ("1", "2"), tmp_path, []))

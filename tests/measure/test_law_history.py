@@ -65,6 +65,14 @@ def test_what_each_release_changed() -> None:
     ]
 
 
+def test_a_law_that_one_release_ran_is_not_kept_or_broken_by_all() -> None:
+    last = [*asked("tower", "2.0", 0.5), *asked("spin", "2.0", 9.0)]
+    assert only([*row("glide", 0.5, 0.5, 0.5, 0.5), *last]).sentences()[-2:] == [
+        "kept by all that ran it: 2 of 3 laws",
+        "broken by all that ran it: spin",
+    ]
+
+
 def twice(*last: float) -> list[Record]:
     """Two repetitions of each release, of the last one these."""
     sets = ((0.2, 0.3), (0.3, 0.2), (0.2, 0.2), last)

@@ -3,6 +3,7 @@ with finer steps; from planted records, and the sentences made of them."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -13,6 +14,7 @@ from pytest_simbench.report.model.settling import section, sentences
 from tests.records.build import record
 
 MODE = ("headless", "tuned")
+A = ("a", *MODE)
 
 
 def end(
@@ -73,11 +75,34 @@ def test_a_difference_that_a_moved_start_makes_too_is_noise() -> None:
         "A start moved by 1 mm moves the end within one simulator as far: the difference is the "
         "scene's own noise, and no cause can be told from it."
     )
-    third = one(*apart, *still, end("b", 21.0, moved=1e-3), end("c", 100.0))
+    more = [*apart, *still, end("b", 21.0, moved=1e-3), end("c", 100.0)]
+    third = one(*more, end("a", 0.0, moved=1e-3), end("c", 100.0, moved=1e-3))
     assert sentences(third)[1] == (
         "Of 3 pairs that differ, moved starts explain 1; the others differ by more than starts "
         "moved by up to 1 mm do."
     )
+    assert sentences(one(*more))[1] == (
+        "Of 3 pairs that differ, moved starts explain 1; of 2 nobody knows, since no moved start "
+        "ended in both."
+    )
+    assert sentences(one(*more, end("c", 100.0, moved=1e-3)))[1] == (
+        "Of 3 pairs that differ, moved starts explain 1; 1 differ by more than starts moved by up "
+        "to 1 mm do; of 1 nobody knows, since no moved start ended in both."
+    )
+
+
+def crashed(simulator: str, *more: float, **given: Any) -> Record:
+    """The same of a repetition that crashed, which has no end."""
+    return end(simulator, 0.0, *more, status="failed", details={}, metrics={}, **given)
+
+
+def test_moved_starts_that_crashed_are_no_sign_that_the_start_has_no_noise() -> None:
+    apart, moved = [end("a==1", 0.0), end("a==2", 10.0)], [crashed("a==2", moved=1e-4)]
+    for lost in [*moved, crashed("a==1", moved=1e-4)], [*moved, end("a==1", 0.0, moved=1e-4)]:
+        assert sentences(one(*apart, *lost))[1:3] == [
+            "2 moves the end by 10 mm: no moved start ended in both, so it may be noise.",
+            "No moved start ended in both, so nobody knows whether this is more than noise.",
+        ]
 
 
 def test_without_moved_starts_or_finer_steps_nobody_knows() -> None:
@@ -109,6 +134,17 @@ def test_a_finer_step_says_whether_the_difference_survives_and_who_is_not_conver
     )
 
 
+def test_who_crashed_at_the_finer_step_does_not_end_alike() -> None:
+    apart = [end("a", 0.0), end("b", 10.0), end("a", 0.1, 0.0005), crashed("b", 0.0005)]
+    assert sentences(one(*apart))[2] == (
+        "With steps 4 times as fine there is no end of b, and nothing is compared."
+    )
+    assert sentences(one(*apart, end("c", 5.0), end("c", 0.2, 0.0005)))[2] == (
+        "With steps 4 times as fine there is no end of b, and the others all end alike; the end of "
+        "c depends on the step, so it is not converged."
+    )
+
+
 def test_equal_ends_of_one_start_that_is_unstable_are_no_agreement() -> None:
     tried = [end("a", 25.0, moved=1e-4), end("b", 3.0, moved=1e-4), end("a", 90.0, moved=1e-3)]
     assert sentences(one(end("a", 0.0), end("b", 0.5), *tried)) == [
@@ -137,17 +173,32 @@ def test_a_crash_is_told_and_other_scenes_stay_apart() -> None:
         assert len(settlings([*records[1:3], *(end(who, 3.0, **other) for who in "ab")])) == 2
 
 
+def test_each_configuration_has_ends_of_its_own() -> None:
+    """Their mean would be the end of neither."""
+    records = [
+        replace(r, settings={**r.settings, "iterations": k})
+        for k, x in ((10, 0.0), (100, 30.0))
+        for r in (end("a", x), end("a", x, 0.0005), end("a", x + 2, moved=1e-3))
+    ]
+    found = one(*records, end("b", 15.0))
+    assert list(found.written) == [(*A, "iterations=10"), (*A, "iterations=100"), ("b", *MODE)]
+    told = [[cell.text for cell in one.cells] for one in section(found).tables[0].columns]
+    assert told[0] == ["a (iterations=10)", "a (iterations=100)", "b"]
+    assert told[2:4] == [["100 % 2", "0 % 2", "-"], ["100 % 0", "0 % 0", "-"]]
+
+
 def test_one_simulator_without_moved_starts_is_no_comparison() -> None:
     assert settlings([end("a", 0.0)]) == []
 
 
+def at(who: str, seed: int, x: float, moved: float = 0.0, step: float = 0.002) -> Record:
+    """The same from one of two stored starts."""
+    own = {**end(who, 0.0, step).settings, "task.starts": 2, "task.moved": moved}
+    return end(who, x, seed=seed, settings=own)
+
+
 def test_stored_starts_are_held_against_themselves_alone() -> None:
     """Two starts that are 500 mm apart on the table are no noise of 500 mm."""
-
-    def at(who: str, seed: int, x: float, moved: float = 0.0) -> Record:
-        own = {**end(who, 0.0).settings, "task.starts": 2, "task.moved": moved}
-        return end(who, x, seed=seed, settings=own)
-
     apart = [at("a", 2, 0.0), at("a", 3, 500.0), at("b", 2, 0.0), at("b", 3, 510.0)]
     moved = [at("a", 2, 0.1, 1e-4), at("a", 3, 500.2, 1e-4)]
     found = one(*apart, *moved)
@@ -156,6 +207,26 @@ def test_stored_starts_are_held_against_themselves_alone() -> None:
     assert found.noise(a, 1e-4) == pytest.approx(0.2)
     lost = one(*apart[:3], *moved)  # b has one start: the other one is not compared
     assert lost.apart(lost.written[a], lost.written[b])[0] == pytest.approx(0.0)
+
+
+def test_ends_of_different_starts_are_no_agreement() -> None:
+    found = one(
+        at("a", 2, 0.0), at("b", 3, 0.0), at("a", 2, 0.0, step=5e-4), at("b", 3, 0.0, step=5e-4)
+    )
+    assert sentences(found) == [
+        "As written, a; b have no start of bowl in common that ended, so nobody knows whether they "
+        "end alike.",
+        "With steps 4 times as fine they have no start in common, where they ended before: the "
+        "step is not to blame.",
+    ]
+    third = [at("a", 2, 0.0), at("b", 3, 0.0), at("c", 2, 9.0), at("a", 3, 0.0, step=5e-4)]
+    assert sentences(one(*third))[:2] == [
+        "As written, bowl ends in 3 ways: a; b; c. They differ by up to 9 mm (bowl, a and c).",
+        "Of 2 pairs more nobody knows, since no start ended in both.",
+    ]
+    assert sentences(one(*third))[-1] == (
+        "With steps 4 times as fine there is no end of b and c, and nothing is compared."
+    )
 
 
 def test_releases_are_told_as_spans_with_the_move_that_does_what_each_boundary_does() -> None:

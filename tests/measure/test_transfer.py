@@ -213,6 +213,24 @@ def test_what_has_no_like_is_left_out_and_the_others_are_compared() -> None:
     ]  # fmt: skip
 
 
+def test_each_configuration_ranks_policies_by_itself() -> None:
+    """And what policies differ in tells no configurations apart."""
+    given = [
+        replace(r, limits={"timeout": len(r.settings["task.policy"])})
+        for r in whole(timestep=0.002)
+    ]
+    other = [
+        replace(r, metrics={"success": r.seed > 9}, settings={**r.settings, "timestep": 0.004})
+        for r in given
+        if r.simulator == "a"
+    ]
+    (found,) = transfers([*given, *other])
+    assert [(who[0], *who[3:]) for who in found.simulators] == [
+        ("a", "timestep=0.002"), ("a", "timestep=0.004"), ("b",)
+    ]  # fmt: skip
+    assert found.outcomes.sum(2).tolist() == [[6, 4], [2, 2], [6, 4]]
+
+
 def test_other_work_is_no_transfer() -> None:
     other = [replace(r, robot={"name": "ur5"}) for r in whole()]
     other += [replace(r, jitter=0.1) for r in whole()] + whole(**{"task.seconds": 3})

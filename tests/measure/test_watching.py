@@ -12,8 +12,8 @@ from pytest_simbench.measure.watching import Step, of_laws, of_scene, of_tasks
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
-from tests.measure.test_law_history import row
-from tests.measure.test_settling import end
+from tests.measure.test_law_history import asked, row
+from tests.measure.test_settling import at, crashed, end
 from tests.records.build import failed, record
 from tests.tiny import Falling
 
@@ -30,6 +30,13 @@ def test_a_law_changes_with_the_release_that_changed_it() -> None:
         (False, "kept by both, by one at least 2 times as closely: spin (0.2x -> 0.001x)"),
     ]
     assert list(of_laws(Step("engine", "1.10", "2.0"), records)) == []
+
+
+def test_a_law_that_was_kept_and_does_not_run_any_more_is_a_change() -> None:
+    gone = [*asked("tower", "1.9", 0.5), *asked("slip", "1.9", 5.0), *asked("spin", "1.10", 0.5)]
+    told = [(True, "was kept, did not run: tower")]
+    assert list(of_laws(STEP, [*row("glide", 0.5, 0.5, 0.5, 0.5), *gone])) == told
+    assert list(of_laws(STEP, gone[:2])) == told  # no law ran at all
 
 
 def falls(version: str, *landed: float | None) -> list[Record]:
@@ -99,3 +106,16 @@ def test_an_end_changes_where_the_scene_s_noise_does_not_explain_it(
             records += [] if moved is None else [end(name, x + moved, moved=1e-4)]
     expected = [(changed, f"a.xml: {text}") for changed, text in found]
     assert list(of_scene(STEP, "a.xml", records)) == expected
+
+
+def test_an_end_whose_moved_starts_crashed_is_no_change() -> None:
+    records = [end(STEP.names[0], 0.0), end(STEP.names[1], 30.0)]
+    records += [crashed(name, moved=1e-4) for name in STEP.names]
+    told = "a.xml: bowl ends 30 mm elsewhere; no moved start ended in both, so it may be noise"
+    assert list(of_scene(STEP, "a.xml", records)) == [(False, told)]
+
+
+def test_ends_of_different_starts_are_no_change() -> None:
+    told = "a.xml: no start ended in both, so nobody knows whether it ends elsewhere"
+    records = [at(STEP.names[0], 2, 0.0), at(STEP.names[1], 3, 30.0)]
+    assert list(of_scene(STEP, "a.xml", records)) == [(False, told)]

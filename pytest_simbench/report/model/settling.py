@@ -8,7 +8,7 @@ from itertools import combinations, groupby, pairwise
 from pytest_simbench.ground.versions import RELEASE, VersionedName, release_numbers
 from pytest_simbench.measure.settling import ALIKE, Ends, Settled
 from pytest_simbench.records.metrics import significant
-from pytest_simbench.records.record import Who
+from pytest_simbench.records.series import Configured
 from pytest_simbench.report.model import cells
 from pytest_simbench.report.model.document import Column, Section, Table, listed, names
 
@@ -38,23 +38,39 @@ def sentences(found: Settled) -> list[str]:
         groups = sorted(groups, key=lambda group: min(releases.index(who) for who in group))
     if len(groups) < 2:
         return [_alike(found, known), *_alone(found)]
-    pairs = _between(groups)
+    ways = "; ".join(_some(_spans(group, releases, known)) for group in groups)
+    pairs = _between(found, found.written, groups)
+    if not pairs:
+        return [
+            f"As written, {ways} have no start of {found.scene} in common that ended, so nobody "
+            "knows whether they end alike.",
+            _finer(found, known),
+        ]
     widest = max(pairs, key=lambda pair: found.apart(*(found.written[who] for who in pair))[0])
     gap, body = found.apart(*(found.written[who] for who in widest))
     told = [
-        f"As written, {found.scene} ends in {len(groups)} ways: "
-        + "; ".join(_some(_spans(group, releases, known)) for group in groups)
-        + f". They differ by up to {_mm(gap)} ({body}, {known[widest[0]]} and {known[widest[1]]})."
+        f"As written, {found.scene} ends in {len(groups)} ways: {ways}. They differ by up to "
+        f"{_mm(gap)} ({body}, {known[widest[0]]} and {known[widest[1]]})."
     ]
+    if unknown := sum(len(a) * len(b) for a, b in combinations(groups, 2)) - len(pairs):
+        told.append(f"Of {unknown} pairs more nobody knows, since no start ended in both.")
     return [*told, *_boundaries(found, releases), _noise(found, pairs), _finer(found, known)]
 
 
-def _between(groups: Sequence[Sequence[Who]]) -> list[tuple[Who, Who]]:
-    """Each two that are in different groups."""
-    return [(a, b) for first, second in combinations(groups, 2) for a in first for b in second]
+def _between(
+    found: Settled, ends: Mapping[Configured, Ends], groups: Sequence[Sequence[Configured]]
+) -> list[tuple[Configured, Configured]]:
+    """Each two that are in different groups and have a start in common."""
+    return [
+        (a, b)
+        for first, second in combinations(groups, 2)
+        for a in first
+        for b in second
+        if found.apart(ends[a], ends[b])[0] > ALIKE
+    ]
 
 
-def _releases(found: Settled) -> list[Who]:
+def _releases(found: Settled) -> list[Configured]:
     """Who is compared, oldest first, where all are releases of one simulator; else nobody."""
     named = [VersionedName.of(who[0]) for who in found.written]
     alone = len({name.base for name in named}) == len({who[1:] for who in found.written}) == 1
@@ -63,7 +79,9 @@ def _releases(found: Settled) -> list[Who]:
     return sorted(found.written, key=lambda who: release_numbers(VersionedName.of(who[0]).which))
 
 
-def _spans(group: Sequence[Who], releases: Sequence[Who], known: Mapping[Who, str]) -> list[str]:
+def _spans(
+    group: Sequence[Configured], releases: Sequence[Configured], known: Mapping[Configured, str]
+) -> list[str]:
     """Names of a group; of releases without a gap the first and the last one."""
     if not releases:
         return [known[who] for who in group]
@@ -74,7 +92,7 @@ def _spans(group: Sequence[Who], releases: Sequence[Who], known: Mapping[Who, st
     ]
 
 
-def _boundaries(found: Settled, releases: Sequence[Who]) -> list[str]:
+def _boundaries(found: Settled, releases: Sequence[Configured]) -> list[str]:
     """Where the end moves from one release to the next, and what moved start does the same."""
     told = []
     for before, after in pairwise(releases):
@@ -82,6 +100,8 @@ def _boundaries(found: Settled, releases: Sequence[Who]) -> list[str]:
         if gap > ALIKE:
             moved = found.explained(before, after)
             cause = "no start that was moved does so"
+            if found.tried(before, after) is None:
+                cause = "no moved start ended in both, so it may be noise"
             if moved is not None:
                 cause = f"a start moved by {_mm(1000 * moved)} does so within one release"
             which = VersionedName.of(after[0]).which
@@ -89,7 +109,7 @@ def _boundaries(found: Settled, releases: Sequence[Who]) -> list[str]:
     return told
 
 
-def _alike(found: Settled, known: dict[Who, str]) -> str:
+def _alike(found: Settled, known: dict[Configured, str]) -> str:
     if len(known) < 2:
         return f"{found.scene} ran in {''.join(known.values())} alone, so nothing is compared."
     return f"As written, {found.scene} ends alike in all {len(known)}, within {_mm(ALIKE)}."
@@ -110,7 +130,7 @@ def _alone(found: Settled) -> list[str]:
     ]
 
 
-def _noise(found: Settled, pairs: Sequence[tuple[Who, Who]]) -> str:
+def _noise(found: Settled, pairs: Sequence[tuple[Configured, Configured]]) -> str:
     if not found.moved:
         return "No moved start was tried, so nobody knows whether this is more than noise."
     explained = [moved for pair in pairs if (moved := found.explained(*pair)) is not None]
@@ -119,36 +139,50 @@ def _noise(found: Settled, pairs: Sequence[tuple[Who, Who]]) -> str:
             f"A start moved by {_mm(1000 * max(explained))} moves the end within one simulator as "
             "far: the difference is the scene's own noise, and no cause can be told from it."
         )
-    largest = max(found.moved)
-    if not explained:
+    rest = [found.tried(*pair) for pair in pairs if found.explained(*pair) is None]
+    known = [moved for moved in rest if moved is not None]
+    if not known and not explained:
+        return "No moved start ended in both, so nobody knows whether this is more than noise."
+    largest = _mm(1000 * min(known, default=0.0))
+    if len(known) == len(pairs):
         return (
-            f"Starts moved by up to {_mm(1000 * largest)} move no end so far: the difference is "
-            "more than the start's noise."
+            f"Starts moved by up to {largest} move no end so far: the difference is more than the "
+            "start's noise."
         )
-    return (
-        f"Of {len(pairs)} pairs that differ, moved starts explain {len(explained)}; the others "
-        f"differ by more than starts moved by up to {_mm(1000 * largest)} do."
-    )
+    told = [f"Of {len(pairs)} pairs that differ, moved starts explain {len(explained)}"]
+    if known:
+        others = "the others" if len(known) == len(rest) else f"{len(known)}"
+        told.append(f"{others} differ by more than starts moved by up to {largest} do")
+    if unknown := len(rest) - len(known):
+        told.append(f"of {unknown} nobody knows, since no moved start ended in both")
+    return "; ".join(told) + "."
 
 
-def _finer(found: Settled, known: dict[Who, str]) -> str:
+def _finer(found: Settled, known: dict[Configured, str]) -> str:
     if not found.finer:
         return "No finer step was tried, so nobody knows whether an end is converged."
     finest = max(found.finer)
-    ends = found.finer[finest]
+    ends = {who: tried for who, tried in found.finer[finest].items() if who in known}
     groups = found.places(ends)
     if not groups:
         return f"With steps {finest} times as fine no repetition finished."
-    moving = [
-        who
-        for who in found.written
-        if (change := found.change(who, finest)) is not None and change > ALIKE
-    ]
-    text = "they all end alike" if len(groups) == 1 else f"they still end in {len(groups)} ways"
-    if len(groups) > 1:
-        gap = max(found.apart(ends[a], ends[b])[0] for a, b in _between(groups))
+    lost = [who for who in known if not any(who in group for group in groups)]
+    pairs = _between(found, ends, groups)
+    changes = {who: found.change(who, finest) for who in known}
+    moving = [who for who, change in changes.items() if change is not None and change > ALIKE]
+    how = f"still end in {len(groups)} ways" if pairs else "have no start in common"
+    if len(groups) == 1:
+        how = "all end alike"
+    text = f"they {how}"
+    if lost:
+        others = f"the others {how}" if len(known) > len(lost) + 1 else "nothing is compared"
+        text = f"there is no end of {_some(_spans(lost, _releases(found), known))}, and {others}"
+    if pairs:
+        gap = max(found.apart(ends[a], ends[b])[0] for a, b in pairs)
         text += f", up to {_mm(gap)} apart"
     text = f"With steps {finest} times as fine {text}"
+    if not moving and None in changes.values():
+        return f"{text}."
     if not moving:
         return f"{text}, where they ended before: the step is not to blame."
     told = _some(_spans(moving, _releases(found), known))

@@ -9,6 +9,7 @@ import numpy as np
 from pytest_simbench.measure.intervals import Interval
 from pytest_simbench.measure.transfer import METRIC, NARROW, Transfer
 from pytest_simbench.records.metrics import Metric
+from pytest_simbench.records.record import Who
 from pytest_simbench.report.model import cells
 from pytest_simbench.report.model.document import Cell, Column, Section, Table, listed, names
 from pytest_simbench.report.model.pooling import spread
@@ -98,7 +99,7 @@ def interval(found: Interval) -> str:
 
 def _simulators(found: Transfer) -> Column:
     whole = zip(names(found.simulators), found.simulators, strict=True)
-    return Column("simulator", [Cell([name], of=who) for name, who in whole], left=True)
+    return Column("simulator", [Cell([name], of=Who(*who[:3])) for name, who in whole], left=True)
 
 
 def _success(found: Transfer) -> list[Column]:
