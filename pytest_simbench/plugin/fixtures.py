@@ -124,7 +124,7 @@ def repeat(
     run = session_of(request.config).run
     run.expected = partial(expected, request.session)
     repeat = RepeatFixture(request.node, simbench_case, run)
-    request.node.stash[REPEATED] = repeat.check_crashes
+    request.node.stash[REPEATED] = repeat
     yield repeat
     repeat.finish(simbench_rounds)
 

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tests.plugin.inner import CLAIMING, FALLING, records, run_pytest
+from tests.plugin.inner import CLAIMING, FALLING, NOTHING_LANDS, records, run_pytest
 
 DYING = """
     import os
@@ -86,6 +86,35 @@ def test_the_ini_file_may_allow_crashes_and_a_mark_is_nearer(pytester: pytest.Py
         deselected=2,
     )
     result.stdout.fnmatch_lines(["FAILED *::test_marked*"])
+
+
+PARTS = """
+    import pytest
+    from tests.tiny import Falling
+
+    def claim(repeat):
+        repeat(Falling()).assert_at_least("landed", 0.9)
+
+    def test_in_parts(repeat, subtests):
+        with subtests.test("a"):
+            pytest.xfail("known")
+        with subtests.test("b"):
+            claim(repeat)
+
+    def test_catches_it_and_fails(repeat):
+        with pytest.raises(AssertionError):
+            claim(repeat)
+        raise ValueError
+"""
+
+
+@pytest.mark.skipif(pytest.version_tuple < (9, 0), reason="pytest 9 has subtests")
+def test_a_claim_in_a_test_that_failed_is_not_known_to_fail(pytester: pytest.Pytester) -> None:
+    """One subtest expected to fail, and so the claim of another was XFAIL."""
+    pytester.makeconftest(NOTHING_LANDS)
+    pytester.makepyfile(PARTS)
+    result = run_pytest(pytester, "--sim=mujoco --reps=8", ret=1)
+    result.stdout.fnmatch_lines(["FAIL   2 of 2 claims fail; *"])
 
 
 STRICT = """
