@@ -263,7 +263,8 @@ class Run:
         self.folder.take_over(Record.from_json(line) for line in lines)
 
     def judge(self, failed: Iterable[Mapping[str, Any]], passed: set[str]) -> None:
-        """Keep which tests failed as a whole; those of the resumed run that pass now do so no more.
+        """Keep which tests failed as a whole; those of the resumed run that pass now do so no more,
+        and of what they claim no more nothing is open.
 
         A run in which nothing was recorded keeps nothing.
         """
@@ -272,8 +273,7 @@ class Run:
         for test in failed:
             self.folder.claim(Claim.from_dict(test))
             passed.discard(test["test"])  # its teardown failed
-        found = self.folder.scan().claims if self.resumed else ()
-        for claim in {claim.identity: claim for claim in found}.values():
+        for claim in {claim.identity: claim for claim in self.folder.claims([])}.values():
             if claim.verdict == "FAIL" and not claim.metric:
                 self.failing |= claim.test not in passed
                 if claim.test in passed:

@@ -41,7 +41,7 @@ class SimSession:
         self.problems: list[str] = []
         self.comparison: Comparison | None = None
         self._received: list[str] = []
-        self._failed: list[dict[str, Any]] = []
+        self._failed: dict[str, dict[str, Any]] = {}
         self._passed: set[str] = set()
         self._exit_status: int = pytest.ExitCode.OK
 
@@ -220,9 +220,11 @@ class SimSession:
         self._received += getattr(report, "simbench", ())
         if told := getattr(report, "simbench_told", None):
             self.run.told |= told
+        if report.when == "setup":
+            self._failed.pop(report.nodeid, None)  # of an earlier attempt
         failed = getattr(report, "simbench_failed", None)
         if failed and not self.in_worker:
-            self._failed.append(failed)
+            self._failed[report.nodeid] = failed
         if report.when == "call" and self.begun:
             self.run.judged.add(report.nodeid)
         if not report.failed and (report.when == "call" or hasattr(report, "wasxfail")):
@@ -237,7 +239,7 @@ class SimSession:
         if self.in_worker:
             return
         if self.begun:
-            self.run.judge(self._failed, self._passed)
+            self.run.judge(self._failed.values(), self._passed)
             self.run.complete()
         if self.comparison is not None and self._alone:
             from pytest_simbench.records.folder import RunContents
