@@ -86,7 +86,8 @@ def pytest_runtest_setup() -> Generator[None, Any, Any]:
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     """So is one that asks for it later; one whose repetitions crashed fails."""
     found = yield from pytest_runtest_setup()
-    item.stash.get(REPEATED, lambda: None)()
+    if REPEATED in item.stash:
+        item.stash[REPEATED].check_crashes()
     return found
 
 

@@ -44,7 +44,11 @@ REFUSALS = (NotResumed, ExecutorError, RecordError, JitterError)
 
 
 class RepeatFixture:
-    """What the fixture `repeat` does for a test, called with a task; the run takes the records."""
+    """What the fixture `repeat` does for a test, called with a task; the run takes the records.
+
+    Attributes:
+        ends: outcomes of the test, and of its subtests.
+    """
 
     def __init__(self, node: pytest.Item, case: Case, run: Run) -> None:
         self.node = node
@@ -53,6 +57,9 @@ class RepeatFixture:
         self.known: list[tuple[str, ...]] = []
         self.results: list[ResultSet] = []
         self.described: list[TaskDescription] = []
+        self.ends: set[str] = set()
+        self.claims: list[Claim] = []
+        self.properties: list[tuple[str, object]] = []
 
     def __call__(self, task: Task) -> ResultSet:
         """Run a task's repetitions, as many as options and marks say.
@@ -118,18 +125,30 @@ class RepeatFixture:
     def finish(self, benchmark: Any) -> None:
         """Tell pytest-benchmark, where there is one, and JUnit; called when the test has ended."""
         alike = Counter[tuple[object, ...]]()
+        known, properties = self.ends and "failed" not in self.ends, self.properties
         for k, result in enumerate(self.results, start=1):
             which = f"{result.records[0].task} {k}: " if len(self.results) > 1 else ""
             for name, value in _properties(result):
-                self.node.user_properties.append((in_one_line(f"{which}{name}"), value))
+                properties.append((in_one_line(f"{which}{name}"), value))
             for metric, judgement in result.judged:
                 claim = claim_of(self.case, result, metric, judgement)
-                self.run.folder.claim(replace(claim, number=alike[claim.identity]))
+                if known and claim.verdict == "FAIL":
+                    claim = replace(claim, verdict="XFAIL")
+                self.claims.append(replace(claim, number=alike[claim.identity]))
+                self.run.folder.claim(self.claims[-1])
                 alike[claim.identity] += 1
                 title = in_one_line(f"{which}claim {metric.name} {judgement.claim}")
-                self.node.user_properties.append((title, claim.verdict))
+                properties.append((title, claim.verdict))
+        self.node.user_properties += properties
         if self.results and benchmark is not None:
             give_rounds(benchmark, self.results, by_task(self.described).values())
+
+    def take_back(self) -> None:
+        """What this attempt of the test told counts no more."""
+        for claim in self.claims:
+            self.run.folder.claim(replace(claim, verdict=""))
+        told = self.node.user_properties
+        told[:] = [item for item in told if item not in self.properties]
 
 
 def claim_of(case: Case, result: ResultSet, metric: Metric, judgement: Judgement) -> Claim:

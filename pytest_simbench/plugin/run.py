@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from functools import cached_property
@@ -262,11 +262,9 @@ class Run:
         """Take over records that came with a report, from an xdist worker for instance."""
         self.folder.take_over(Record.from_json(line) for line in lines)
 
-    def judge(
-        self, failed: Iterable[Mapping[str, Any]], passed: set[str], xfailed: Collection[str]
-    ) -> None:
+    def judge(self, failed: Iterable[Mapping[str, Any]], passed: set[str]) -> None:
         """Keep which tests failed as a whole; those of the resumed run that pass now do so no more,
-        and what failed as expected is told as that.
+        and of what they claim no more nothing is open.
 
         A run in which nothing was recorded keeps nothing.
         """
@@ -275,11 +273,8 @@ class Run:
         for test in failed:
             self.folder.claim(Claim.from_dict(test))
             passed.discard(test["test"])  # its teardown failed
-        found = self.folder.scan().claims if self.resumed or xfailed else ()
-        for claim in {claim.identity: claim for claim in found}.values():
-            if claim.verdict == "FAIL" and claim.test in xfailed:
-                self.folder.claim(replace(claim, verdict="XFAIL"))
-            elif claim.verdict == "FAIL" and not claim.metric:
+        for claim in {claim.identity: claim for claim in self.folder.claims([])}.values():
+            if claim.verdict == "FAIL" and not claim.metric:
                 self.failing |= claim.test not in passed
                 if claim.test in passed:
                     self.folder.claim(replace(claim, verdict="PASS", advice=""))

@@ -5,7 +5,7 @@ Imported at plugin load: standard library and pytest only; everything else is im
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Generator
+from collections.abc import Collection, Generator
 from contextlib import suppress
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -41,9 +41,8 @@ class SimSession:
         self.problems: list[str] = []
         self.comparison: Comparison | None = None
         self._received: list[str] = []
-        self._failed: list[dict[str, Any]] = []
+        self._failed: dict[str, dict[str, Any]] = {}
         self._passed: set[str] = set()
-        self._xfailed: set[str] = set()
         self._skipped: set[str] = set()
         self._exit_status: int = pytest.ExitCode.OK
 
@@ -208,12 +207,9 @@ class SimSession:
             return report
         if report.when == "call" and (lines := self.run.of_test(item.nodeid)):
             report.simbench = lines
+        if report.when == "call" and REPEATED in item.stash:
+            item.stash[REPEATED].ends.add(report.outcome)
         report.simbench_told = dict(self.run.told)
-        if report.when == "teardown" and item.nodeid in self._xfailed:  # as JUnit reads it
-            report.user_properties = [
-                (name, "XFAIL" if "claim " in name and value == "FAIL" else value)
-                for name, value in report.user_properties
-            ]
         if report.failed and hasattr(item, "callspec") and "sim_case" in fixtures_of(item):
             from pytest_simbench.plugin.marks import describe_failure
 
@@ -225,15 +221,17 @@ class SimSession:
         self._received += getattr(report, "simbench", ())
         if told := getattr(report, "simbench_told", None):
             self.run.told |= told
+        if report.when == "setup":
+            self._failed.pop(report.nodeid, None)  # of an earlier attempt
         failed = getattr(report, "simbench_failed", None)
         if failed and not self.in_worker:
-            self._failed.append(failed)
+            self._failed[report.nodeid] = failed
         if report.when == "call" and self.begun:
             self.run.judged.add(report.nodeid)
-        if report.when == "call" and report.passed:
+        if not report.failed and (report.when == "call" or hasattr(report, "wasxfail")):
             self._passed.add(report.nodeid)
-        elif report.skipped:
-            (self._xfailed if hasattr(report, "wasxfail") else self._skipped).add(report.nodeid)
+        if report.skipped and not hasattr(report, "wasxfail"):
+            self._skipped.add(report.nodeid)
 
     @pytest.hookimpl(trylast=True)  # xdist has heard all its workers then
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
@@ -244,7 +242,7 @@ class SimSession:
         if self.in_worker:
             return
         if self.begun:
-            self.run.judge(self._failed, self._passed, self._xfailed)
+            self.run.judge(self._failed.values(), self._passed)
             self.run.complete()
         if self.comparison is not None and self._alone:
             from pytest_simbench.records.folder import RunContents
@@ -308,8 +306,8 @@ class SimSession:
             self.run.close()
 
 
-REPEATED: pytest.StashKey[Callable[[], None]] = pytest.StashKey()
-"""Of a test that repeats a task: fails it when more crashed than may; called when it has passed."""
+REPEATED: pytest.StashKey[Any] = pytest.StashKey()
+"""Of a test that repeats a task: its `RepeatFixture`."""
 
 _SESSION = pytest.StashKey[SimSession]()
 

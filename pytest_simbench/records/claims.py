@@ -9,8 +9,8 @@ from pytest_simbench.records.checked import Count, Name
 from pytest_simbench.records.description import FolderLine
 
 Verdict = Literal["PASS", "FAIL", "UNDECIDED", "XFAIL", ""]
-"""What the repetitions say; XFAIL: it fails, and so its test was expected to; empty: nothing any
-more, since the test is judged anew."""
+"""What the repetitions say; XFAIL: it fails, and its test was expected to or caught it; empty:
+nothing any more, since the test is judged anew."""
 
 Relation = Literal["at least", "at most"]
 

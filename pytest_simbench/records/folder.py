@@ -218,6 +218,10 @@ class RunFolder:
             self._claims.append(claim)
             self._write(CLAIMS, json.dumps(claim.to_dict()))
 
+    def claims(self, problems: list[str]) -> tuple[Claim, ...]:
+        """As they were judged; `problems` takes what is wrong with their lines."""
+        return (*self._parsed(CLAIMS, Claim, problems), *self._claims)
+
     def _write(self, name: str, line: str) -> None:
         if name not in self._files:
             noun = NOUNS.get(name, "record")
@@ -250,7 +254,7 @@ class RunFolder:
         records = settled([*found.items, *self.own])
         tasks = self._tasks(problems)
         asked = dict.fromkeys([*self._parsed(THRESHOLDS, Threshold, problems), *self._asked])
-        claims = (*self._parsed(CLAIMS, Claim, problems), *self._claims)
+        claims = self.claims(problems)
         return RunContents(
             name=str(self.path if self._records == RECORDS else path),
             records=tuple(records),

@@ -171,7 +171,8 @@ class Sensitivity:
         return f"mm per mm after {self.perturbation}: {', '.join(parts)}; most {most}"
 
     def assert_below(self, most: float, until: float | str) -> None:
-        """Raise AssertionError when the ratio exceeds `most` before a time or a moment.
+        """Raise AssertionError when the ratio exceeds `most` before a time or a moment, or the
+        task ended before.
 
         Args:
             until: seconds after the task began, or the name of one of the moments.
@@ -185,8 +186,12 @@ class Sensitivity:
                 raise ValueError(f"no moment is named {until!r}; there are: {known}")
             judged, when = [self.until[until]], until
         else:
-            told = (*self.ratio.items(), *self.course)
+            told = [(t, r) for t, r in (*self.ratio.items(), *self.course) if r is not None]
             judged, when = [r for t, r in told if t <= until + 1e-9], f"{until:g} s"
+            if told and (end := max(told)[0]) < until - 1e-9:
+                raise AssertionError(
+                    f"{self.simulator}: the task ended after {end:g} s, before {when}"
+                )
         found = [ratio for ratio in judged if ratio is not None]
         if not found:
             raise AssertionError(f"{self.simulator}: the task never came to {when}")

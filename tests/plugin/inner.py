@@ -24,6 +24,16 @@ def test_falling(repeat):
 
 CLAIMING = FALLING.rstrip() + '.assert_at_least("landed", 0.1)\n'
 
+NOTHING_LANDS = """
+from tests.made_up import MadeUp
+
+def pytest_sessionstart(session):
+    ours = session.config.pluginmanager.get_plugin("simbench-session")
+    found = {"status": "ok", "metrics": {"landed": 0.0}, "stepping": {"wall": 0.1}}
+    ours.run.executor = MadeUp(1, lambda experiment, number: (found, None))
+"""
+"""A conftest: repetitions are made up."""
+
 
 def records(folder: Path | str) -> list[dict[str, Any]]:
     """The records of a run folder."""

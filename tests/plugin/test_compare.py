@@ -15,7 +15,7 @@ import pytest
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
 from pytest_simbench.plugin.compare import _name
 from pytest_simbench.records.baseline import read_baseline
-from tests.plugin.inner import FALLING, run_before, run_pytest
+from tests.plugin.inner import NOTHING_LANDS, run_before, run_pytest
 
 TEST = """
     import os
@@ -212,19 +212,51 @@ def test_junit_has_a_property_for_each_metric(
     assert {"falling 1: landed", "falling 2: landed"} <= {*names}
 
 
+KNOWN = """
+    import pytest
+    from tests.tiny import Falling
+
+    def claim(repeat):
+        repeat(Falling()).assert_at_least("landed", 0.9)
+
+    @pytest.mark.xfail
+    def test_expects(repeat):
+        claim(repeat)
+
+    def test_catches(repeat):
+        with pytest.raises(AssertionError):
+            claim(repeat)
+
+    def test_skips(repeat):
+        try:
+            claim(repeat)
+        except AssertionError:
+            pytest.skip("known")
+"""
+
+
 def test_a_claim_that_is_known_to_fail_does_so_in_junit_and_on_a_badge(
     pytester: pytest.Pytester,
 ) -> None:
-    claiming = FALLING.rstrip().replace("()", "(0.05)") + '.assert_at_least("landed", 0.9)\n'
-    pytester.makepyfile(claiming.replace("def ", "import pytest\n@pytest.mark.xfail\ndef "))
+    """One that the test itself caught was FAIL in a run that passed."""
+    pytester.makeconftest(NOTHING_LANDS)
+    unknown = KNOWN.replace("AssertionError", "KeyError").replace("mark.xfail", "mark.reps(8)")
     told = "--sim=mujoco --reps=8 --junitxml=junit.xml --sim-badge=badge.json"
-    run_pytest(pytester, told, xfailed=1)
-    found = ElementTree.parse(pytester.path / "junit.xml").iter("property")
-    claimed = [item.get("value") for item in found if "claim " in str(item.get("name"))]
-    assert claimed == ["XFAIL"]
-    badge = (pytester.path / "badge.json").read_text()
-    assert "1 of 1 claims known to fail" in badge
-    assert "yellow" in badge
+    fails = ("FAIL   3 of 3 claims fail", "mujoco: failing", "red")
+    known = ("XFAIL   0 of 3 claims hold, 3 known", "3 of 3 claims known to fail", "yellow")
+    for test, folder, code, (line, message, colour) in (
+        (unknown, "--sim-output=a", 1, fails),
+        (KNOWN, "--sim-resume=a", 0, known),
+    ):
+        pytester.makepyfile(test)
+        result = run_pytest(pytester, told, folder, ret=code)
+        result.stdout.fnmatch_lines([f"{line}*"])
+        found = ElementTree.parse(pytester.path / "junit.xml").iter("property")
+        claimed = [item.get("value") for item in found if "claim " in str(item.get("name"))]
+        assert claimed == [line.split()[0]] * 3
+        badge = (pytester.path / "badge.json").read_text()
+        assert message in badge
+        assert colour in badge
 
 
 def test_a_saved_run_is_named_by_its_time_and_its_commit() -> None:

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tests.plugin.inner import CLAIMING, FALLING, records, run_pytest
+from tests.plugin.inner import CLAIMING, FALLING, NOTHING_LANDS, records, run_pytest
 
 DYING = """
     import os
@@ -86,6 +86,78 @@ def test_the_ini_file_may_allow_crashes_and_a_mark_is_nearer(pytester: pytest.Py
         deselected=2,
     )
     result.stdout.fnmatch_lines(["FAILED *::test_marked*"])
+
+
+PARTS = """
+    import pytest
+    from tests.tiny import Falling
+
+    def claim(repeat):
+        repeat(Falling()).assert_at_least("landed", 0.9)
+
+    def test_in_parts(repeat, subtests):
+        with subtests.test("a"):
+            pytest.xfail("known")
+        with subtests.test("b"):
+            claim(repeat)
+
+    def test_catches_it_and_fails(repeat):
+        with pytest.raises(AssertionError):
+            claim(repeat)
+        raise ValueError
+"""
+
+
+@pytest.mark.skipif(pytest.version_tuple < (9, 0), reason="pytest 9 has subtests")
+def test_a_claim_in_a_test_that_failed_is_not_known_to_fail(pytester: pytest.Pytester) -> None:
+    """One subtest expected to fail, and so the claim of another was XFAIL."""
+    pytester.makeconftest(NOTHING_LANDS)
+    pytester.makepyfile(PARTS)
+    result = run_pytest(pytester, "--sim=mujoco --reps=8", ret=1)
+    result.stdout.fnmatch_lines(["FAIL   2 of 2 claims fail; *"])
+
+
+RERUN = """
+from _pytest.runner import runtestprotocol
+
+def pytest_runtest_protocol(item, nextitem):
+    for attempt in (1, 2):
+        item._initrequest()
+        for report in runtestprotocol(item, nextitem=nextitem, log=False):
+            if attempt == 1 and report.failed:
+                report.outcome = "rerun"
+            item.ihook.pytest_runtest_logreport(report=report)
+    return True
+"""
+
+AGAIN = """
+    from tests.tiny import Falling
+
+    attempts = []
+
+    def test_claims_it_once(repeat):
+        result = repeat(Falling())
+        attempts.append(1)
+        if len(attempts) == 1:
+            result.assert_at_least("landed", 0.9)
+
+    def test_other(repeat):
+        repeat(Falling()).assert_at_most("landed", 0.9)
+        attempts.append(2)
+        assert attempts.count(2) == 2
+"""
+
+
+def test_what_the_last_attempt_says_counts(pytester: pytest.Pytester) -> None:
+    """As pytest-rerunfailures does: pytest passed, and the report told the first attempt's FAIL."""
+    pytester.makeconftest(NOTHING_LANDS + RERUN)
+    pytester.makepyfile(AGAIN)
+    for words in ("--sim-output=o", "--sim-resume=o -k other"):
+        result = run_pytest(pytester, f"--sim=mujoco --reps=8 --junitxml=j.xml {words}", ret=0)
+        result.stdout.fnmatch_lines(["PASS   1 of 1 claims hold; *"])
+    *_, last = ElementTree.parse(pytester.path / "j.xml").iter("testcase")
+    names = [str(item.get("name")) for item in last.iter("property")]
+    assert len({*names}) == len(names)
 
 
 STRICT = """

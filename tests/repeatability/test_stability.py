@@ -98,6 +98,15 @@ def test_only_what_comes_before_is_judged() -> None:
         Sensitivity("sim", "it", {}, 9.0).assert_below(9.0, until="c")
 
 
+def test_an_episode_that_ended_before_shows_nothing_of_the_rest() -> None:
+    """One of 1.4 s passed as "below 2 until 20 s"."""
+    course = [(0.0, 1.0), (1.0, 1.2), (1.4, 1.3)]
+    grown = Sensitivity("sim", "it", {0.1: 1.0, 1.0: 1.2, 5.0: None}, 1.3, course=course)
+    grown.assert_below(2.0, until=1.4)
+    with pytest.raises(AssertionError, match=r"^sim: the task ended after 1\.4 s, before 20 s$"):
+        grown.assert_below(2.0, until=20.0)
+
+
 def test_a_peak_between_the_times_that_are_told_is_judged() -> None:
     """Growth is told at 1 s and 5 s; 1000 mm per mm at 2 s passed as "below 10 until 3 s"."""
 

@@ -48,8 +48,8 @@ LONGEST = 60
 def badge(records: Sequence[Record], passed: bool | None, claims: Sequence[Claim]) -> str:
     """The badge of a run, as JSON.
 
-    Green: every test passed and no repetition crashed. Yellow: some did, or a claim failed as
-    expected.
+    Green: every test passed and no repetition crashed. Yellow: some did, or a claim is known to
+    fail.
     Red: a test or a limit failed. Grey: nothing was measured, or it is not known what passed.
     Interrupted repetitions say nothing.
     """
@@ -57,7 +57,8 @@ def badge(records: Sequence[Record], passed: bool | None, claims: Sequence[Claim
     failed = sum(not record.ok for record in ended)
     names = list(dict.fromkeys(record.simulator for record in ended))
     who = names[0] if len(names) == 1 else f"{len(names)} simulators"
-    verdicts = [claim.verdict for claim in {claim.identity: claim for claim in claims}.values()]
+    last = {claim.identity: claim for claim in claims if claim.metric}
+    verdicts = [claim.verdict for claim in last.values() if claim.verdict]
     if not ended:
         message, colour = "nothing measured", "lightgrey"
     elif passed is None:
