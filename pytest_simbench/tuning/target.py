@@ -316,7 +316,7 @@ def _halves(
         last = min(seeds or REAL_CHOSEN, chosen.repetitions), min(judged, other.repetitions)
         return looks(chosen, 1, last[0]), looks(other, 1, last[1]), FIRST_JUDGED
     if isinstance(task, OnScene) and not getattr(task, "moved", 0.0):
-        many = len(task.world.starts) or 1
+        many = len(task.starts) or 1
         half = min(seeds or CHOSEN, (many + 1) // 2)
         return looks(task, 1, half), looks(task, half + 1, min(half + judged, many)), FIRST_CHOSEN
     return looks(task, 1, seeds or CHOSEN), looks(task, 1, judged), FIRST_JUDGED
