@@ -101,6 +101,23 @@ def test_a_velocity_moves_the_set_point_on() -> None:
     assert whole.effort.dtype == float
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        Command(velocity=np.full(7, 0.2)), Command(tool_change=np.full(6, 0.01)),
+        Command(tool=Pose((0.45, 0.3, 0.3), (0.0, 1.0, 0.0, 0.0))),
+    ],
+)  # fmt: skip
+def test_a_velocity_and_a_way_of_the_tool_hold_for_one_period(command: Command) -> None:
+    at = points()
+    at.after(command)
+    there = at.position[:7].copy()
+    assert not np.array_equal(there, START[:7])
+    for answer in (None, Command(gripper=0.02)):
+        at.after(answer)
+        assert np.array_equal(at.position[:7], there)
+
+
 def test_the_arm_is_held_against_gravity() -> None:
     at = points()
     model = SERVO.model
