@@ -177,6 +177,8 @@ def test_out_of_reach_the_joints_stay_within_their_limits() -> None:
     [
         (np.zeros(8), r"answers position of shape \(8,\); the arm has 7 joints, and 9 with its"),
         ("left", "answers position='left', which is no number"),
+        (np.full(7, 1j), "which is no number"),
+        (Command(gripper=0.02 + 0j), "which is no number"),  # type: ignore[arg-type]
         (np.full(7, np.nan), "position with a number that is not finite"),
         (Command(velocity=np.full(7, 1e300)), "velocity with a number that is not finite, or"),
         (Command(tool_change=[1e300] * 6), "tool_change with a number that is not finite"),
