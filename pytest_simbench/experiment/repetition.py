@@ -32,6 +32,7 @@ from pytest_simbench.scene import Scene
 from pytest_simbench.scene.policy import Kinematics
 from pytest_simbench.simulator import DescriptionError
 from pytest_simbench.tasks.base import Outcome
+from pytest_simbench.tasks.own import own
 from pytest_simbench.worker.stepping import CHECK_PERIOD
 from pytest_simbench.worker.wire import named
 
@@ -189,7 +190,7 @@ class Repetition:
         world.watch(self.seed)
         if self._camera is not None:
             self._camera.enter(world, self.where.phase)
-        outcome = self.experiment.task.perform(world, self.seed, self.hooks.count)
+        outcome = own(self.experiment.task).perform(world, self.seed, self.hooks.count)
         if not isinstance(outcome, Outcome):
             raise TypeError(f"perform() returns an Outcome, not {type(outcome).__name__}")
         self._stats = world.stats()

@@ -109,7 +109,8 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What a policy answers. What it does not say stays as it was told last.
+    """What a policy answers. A position of which it says nothing stays where it is; a velocity or a
+    way of the tool holds for one period.
 
     Attributes:
         position: of the arm's joints, or of all joints [rad or m].
@@ -154,7 +155,7 @@ class Policy(ABC):
 
     @abstractmethod
     def act(self, observation: Observation) -> Any:
-        """A `Command`, positions of joints, or None to go on as before."""
+        """A `Command`, positions of joints, or None: the set points stay where they are."""
 
 
 class Function(Policy):

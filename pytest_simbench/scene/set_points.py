@@ -207,6 +207,8 @@ def _changed(tool: Pose, change: FloatArray) -> Pose:
 
 def _numbers(values: Any, what: str) -> FloatArray:
     try:
+        if np.iscomplexobj(values):  # it would lose its imaginary part
+            raise TypeError
         found = np.asarray(values, dtype=float)
     except (TypeError, ValueError):
         raise PolicyError(f"the policy answers {what}={values!r:.60}, which is no number") from None

@@ -6,13 +6,9 @@ Lengths are those of an arm of full reach; a smaller one has a smaller scene, as
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections import deque
 from collections.abc import Mapping
-from contextlib import suppress
-from copy import copy, deepcopy
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
-from types import MethodType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -129,7 +125,7 @@ class GoalTask(Task):
         world.mark("start")
         with world.phase("act"):
             world.control(
-                _copied(self.policy),  # other repetitions may be under way
+                self.policy,
                 until=self.seconds if self.inside else stayed,
                 at_most=self.seconds,
                 rate=self.rate,
@@ -261,21 +257,3 @@ class PickAndPlace(GoalTask):
 @lru_cache(64)
 def _drawn(seed: int, low: tuple[float, ...], high: tuple[float, ...]) -> Any:
     return Randomness.of(seed).order.uniform(low, high)
-
-
-KEPT = list, dict, set, deque, MethodType
-"""What a policy changes in place while it acts. A method changes what it is bound to."""
-
-
-def _copied(policy: Any) -> Any:
-    """With arrays, lists and dicts of its own; a network, or what cannot be copied, is shared, and
-    so are arrays of which one is a view of another."""
-    own = copy(policy)  # a function is not copied
-    held, known = {} if own is policy else getattr(own, "__dict__", {}), {id(policy): own}
-    arrays = [value for value in held.values() if isinstance(value, np.ndarray)]
-    linked = any(one.base is other for one in arrays for other in arrays)
-    for name, value in held.items():
-        if isinstance(value, KEPT if linked else (*KEPT, np.ndarray)):
-            with suppress(Exception):
-                held[name] = deepcopy(value, known)
-    return own

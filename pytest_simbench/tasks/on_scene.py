@@ -40,13 +40,17 @@ class OnScene(Task):
         return {
             "task.scene": self.world.name,
             "task.scene_digest": data_digest(wire, 16),
-            "task.starts": len(self.world.starts),
+            "task.starts": len(self.starts),
         }
+
+    @property
+    def starts(self) -> Sequence[Start]:
+        """That repetitions go through."""
+        return self.world.starts
 
     def start(self, seed: int) -> Start | None:
         """Where a repetition starts; None: as the scene is written."""
-        starts = self.world.starts
-        return starts[seed % len(starts)] if starts else None
+        return self.starts[seed % len(self.starts)] if self.starts else None
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
         start = self.start(seed)

@@ -87,14 +87,14 @@ class Replaying(OnJoints):
 
     def parameters(self) -> dict[str, Any]:
         return super().parameters() | {
-            "task.starts": 1,
             "task.log": self.log.digest,
             "task.log_joints": list(self.log.joints),
             "task.seconds": self.log.trajectory.duration,
         }
 
-    def start(self, seed: int) -> Start:
-        return self.log.start
+    @property
+    def starts(self) -> Sequence[Start]:
+        return (self.log.start,)
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
         told, began = self.log.trajectory, world.time

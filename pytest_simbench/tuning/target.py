@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -128,9 +129,16 @@ class Target:
 
     @property
     def period(self) -> float:
-        """Of the policy, a multiple of any time step [s]; 0 without a policy."""
-        policy = getattr(self.chosen[0].task, "policy", None)
-        return 1 / getattr(policy, "rate", Policy.rate) if policy else 0.0
+        """What any time step divides [s]: a policy's period and latency; 0 without a policy."""
+        task: Any = self.chosen[0].task
+        if not (policy := getattr(task, "policy", None)):
+            return 0.0
+        rate: float = getattr(task, "rate", 0.0) or getattr(policy, "rate", Policy.rate)
+        both = 1 / rate, getattr(task, "command_latency", 0.0)
+        period, late = (Fraction(seconds).limit_denominator(10**6) for seconds in both)
+        while late:  # their greatest common divisor
+            period, late = late, period % late
+        return float(period)
 
     @property
     def word(self) -> str:
@@ -308,7 +316,7 @@ def _halves(
         last = min(seeds or REAL_CHOSEN, chosen.repetitions), min(judged, other.repetitions)
         return looks(chosen, 1, last[0]), looks(other, 1, last[1]), FIRST_JUDGED
     if isinstance(task, OnScene) and not getattr(task, "moved", 0.0):
-        many = len(task.world.starts) or 1
+        many = len(task.starts) or 1
         half = min(seeds or CHOSEN, (many + 1) // 2)
         return looks(task, 1, half), looks(task, half + 1, min(half + judged, many)), FIRST_CHOSEN
     return looks(task, 1, seeds or CHOSEN), looks(task, 1, judged), FIRST_JUDGED

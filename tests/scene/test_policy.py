@@ -101,6 +101,23 @@ def test_a_velocity_moves_the_set_point_on() -> None:
     assert whole.effort.dtype == float
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        Command(velocity=np.full(7, 0.2)), Command(tool_change=np.full(6, 0.01)),
+        Command(tool=Pose((0.45, 0.3, 0.3), (0.0, 1.0, 0.0, 0.0))),
+    ],
+)  # fmt: skip
+def test_a_velocity_and_a_way_of_the_tool_hold_for_one_period(command: Command) -> None:
+    at = points()
+    at.after(command)
+    there = at.position[:7].copy()
+    assert not np.array_equal(there, START[:7])
+    for answer in (None, Command(gripper=0.02)):
+        at.after(answer)
+        assert np.array_equal(at.position[:7], there)
+
+
 def test_the_arm_is_held_against_gravity() -> None:
     at = points()
     model = SERVO.model
@@ -160,6 +177,8 @@ def test_out_of_reach_the_joints_stay_within_their_limits() -> None:
     [
         (np.zeros(8), r"answers position of shape \(8,\); the arm has 7 joints, and 9 with its"),
         ("left", "answers position='left', which is no number"),
+        (np.full(7, 1j), "which is no number"),
+        (Command(gripper=0.02 + 0j), "which is no number"),  # type: ignore[arg-type]
         (np.full(7, np.nan), "position with a number that is not finite"),
         (Command(velocity=np.full(7, 1e300)), "velocity with a number that is not finite, or"),
         (Command(tool_change=[1e300] * 6), "tool_change with a number that is not finite"),

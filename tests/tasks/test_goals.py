@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import make_dataclass, replace
+from dataclasses import dataclass, make_dataclass, replace
 from fractions import Fraction
 from functools import partial
 from types import SimpleNamespace
@@ -14,13 +14,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.motion.kinematics import DOWNWARD
 from pytest_simbench.motion.registry import known_robot
 from pytest_simbench.scene import Pose
 from pytest_simbench.scene.policy import Command, Observation, as_policy
 from pytest_simbench.tasks import GoalTask, Jitter, PickAndPlace, PushingToGoal, Reaching
-from pytest_simbench.tasks.base import Outcome
+from pytest_simbench.tasks.base import Count, Outcome
 from pytest_simbench.tasks.recorded import code_of, digest, recorded
 from tests.conftest import performed
 from tests.tasks.scripted import Mishap, ScriptedProcess, ScriptedWorld, put
@@ -231,8 +232,20 @@ def test_the_motion_is_kept_for_the_replay(case: Case) -> None:
     assert (np.diff(times) > 0).all()
 
 
+@dataclass(frozen=True)
+class Own(Reaching):
+    """A task of one's own."""
+
+    def perform(self, world: World, seed: int, count: Count) -> Outcome:
+        world.control(self.policy, until=self.seconds, rate=self.rate)
+        return Outcome({"success": 1.0, "distance": 0.0, "time": None})
+
+
 @pytest.mark.engine
-def test_what_a_policy_gathers_in_one_repetition_is_not_in_the_next(case: Case) -> None:
+@pytest.mark.parametrize("kind", [Reaching, Own])
+def test_what_a_policy_gathers_in_one_repetition_is_not_in_the_next(
+    case: Case, kind: type[Reaching]
+) -> None:
     class Gathering:
         def __init__(self) -> None:
             self.rows, self.sum = [0.0], np.zeros(1)
@@ -250,7 +263,7 @@ def test_what_a_policy_gathers_in_one_repetition_is_not_in_the_next(case: Case) 
             self.count += 1
 
     policy = Gathering()
-    record = performed(case, Reaching(policy, seconds=0.2, rate=10.0))
+    record = performed(case, kind(policy, seconds=0.2, rate=10.0))
     assert [*policy.rows, *policy.sum] == [0.0, 0.0]
     assert record.settings["task.policy_digest"] == digest(Gathering())
 

@@ -92,13 +92,16 @@ def test_todays_own_step_is_no_candidate_beside_it(tmp_path: Path) -> None:
     assert {variant for variant, _ in executor.asked} == {"today", "trial1"}
 
 
-def test_steps_for_a_policy_divide_its_period(tmp_path: Path) -> None:
+@pytest.mark.parametrize("rhythm", [Rhythm(Policy.rate), Rhythm(40.0, 0.01), Rhythm(60.0, 1 / 90)])
+def test_steps_for_a_policy_divide_its_period_and_latency(tmp_path: Path, rhythm: Rhythm) -> None:
+    """The task's, where it says them; else the policy's."""
     pytest.importorskip("optuna")
     one, _ = search(tmp_path, over="timestep")
-    looks = (Look(Reaching(lambda seen: None), 1),)
+    said = {name: value for name, value in vars(rhythm).items() if value != Policy.rate}
+    looks = (Look(Reaching(lambda seen: None, **said), 1),)
     one.trials.target = replace(one.trials.target, chosen=looks)
-    for found in one.run(1e9, 8)[1:]:
-        assert Rhythm(Policy.rate).steps(found.changes["timestep"])
+    steps = [found.changes["timestep"] for found in one.run(1e9, 8)[1:]]
+    assert all(map(rhythm.steps, steps))
 
 
 def test_a_setting_that_does_not_act_is_not_asked_for(tmp_path: Path) -> None:

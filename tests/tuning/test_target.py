@@ -14,7 +14,7 @@ from pytest_simbench.laws.base import OTHER, held_out
 from pytest_simbench.measure.verdicts import at_least, at_most
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.scene import Pose, Scene, Start
-from pytest_simbench.tasks import Settling, Tossing
+from pytest_simbench.tasks import Replaying, Settling, Tossing
 from pytest_simbench.tasks.base import cube
 from pytest_simbench.tuning import target as module
 from pytest_simbench.tuning.target import (
@@ -27,6 +27,8 @@ from pytest_simbench.tuning.target import (
     target,
 )
 from tests.records.build import record
+from tests.tasks.scripted_scene import SCENE
+from tests.tasks.test_replaying import log_of
 from tests.tiny import WHITE, Falling
 
 from .made_up import LANDED
@@ -183,3 +185,11 @@ def test_starts_of_a_scene_are_not_judged_again(starts: int, halves: tuple[int, 
     moved = replace(asked[0], moved=0.001), ()
     found = target("t.py::test_it", "cpu_cost", "converged:tilt", None, 9, asked=moved)
     assert (len(found.chosen), len(found.judged), found.first_judged) == (4, 9, FIRST_JUDGED)
+
+
+def test_who_follows_a_log_starts_where_it_begins() -> None:
+    """The starts of its scene do not count, so there is nothing to judge by."""
+    log = log_of(["hinge"])
+    asked = Replaying(replace(SCENE, starts=(log.start,) * 8), log), ()
+    found = target("t.py::test_it", "cpu_cost", "error_hinges", None, 9, asked=asked)
+    assert (len(found.chosen), found.judged) == (1, ())
