@@ -109,8 +109,8 @@ class Body(_Placed):
         colour: red, green, blue, alpha in 0..1.
         linear_velocity: of its centre at the start, in the world frame [m/s].
         angular_velocity: of the body at the start, in the world frame [rad/s].
-        restitution: Newton's coefficient e: what an impact leaves of the normal velocity. All
-            surfaces of a scene that bounce have the same one, as with friction.
+        restitution: Newton's coefficient e: what an impact leaves of the normal velocity. Of
+            two surfaces that differ each engine makes one in its own way, which a run tells.
         linear_damping: c of dv/dt = -c v of a free body [1/s].
         angular_damping: the same of its angular velocity [1/s].
         moments: principal moments of inertia about the centre, along the body's axes [kg m^2], of a

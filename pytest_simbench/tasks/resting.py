@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pytest_simbench.client.errors import EngineFailed
 from pytest_simbench.client.motion import Motion
@@ -95,6 +96,16 @@ def spread(scene: Scene, forces: Sequence[Forces]) -> float | None:
     rows = [[found[p][:3] if p in found else np.zeros(3) for p in pairs] for found in forces]
     each = np.array(rows).reshape(len(forces), -1)
     return 100 * float(np.sqrt(each.var(axis=0).sum())) / weight
+
+
+def by_poses(motion: Motion) -> FloatArray:
+    """The bodies of all samples but the last, as fast as their poses change until the next one."""
+    now, then = motion.bodies[:-1], motion.bodies[1:]
+    step = np.diff(motion.time).reshape(-1, 1, 1)
+    turns = [Rotation.from_quat(rows[..., [4, 5, 6, 3]].reshape(-1, 4)) for rows in (now, then)]
+    turned = (turns[1] * turns[0].inv()).as_rotvec().reshape(*now.shape[:2], 3)
+    ways = then[..., :3] - now[..., :3]
+    return np.concatenate([now[..., :7], ways / step, turned / step], axis=2)
 
 
 def rates(time: FloatArray, values: FloatArray) -> FloatArray:

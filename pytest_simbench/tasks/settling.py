@@ -18,7 +18,7 @@ from pytest_simbench.scene.overlap import rotations
 from pytest_simbench.scene.penetration import penetration
 from pytest_simbench.tasks.base import Count, Jitter, Outcome
 from pytest_simbench.tasks.on_scene import FARTHEST, OnScene, places, started, ways
-from pytest_simbench.tasks.resting import FORCE_JITTER, RESTLESS, SHORTEST, calm, spread
+from pytest_simbench.tasks.resting import FORCE_JITTER, RESTLESS, SHORTEST, by_poses, calm, spread
 
 
 @dataclass(frozen=True)
@@ -151,13 +151,14 @@ class Settling(OnScene):
         tilts = {name: tilted(before[name], pose) for name, pose in after.items()}
         failed = [str(p) for p in self.premises if not _holds(p, bodies, tilts)]
         ends = {body.name: body.moved_to(world.pose(body.name)) for body in scene.free_bodies}
-        squares = np.sum(rest.bodies[:, :, 7:10] ** 2, axis=2)  # of speeds
+        moving = by_poses(rest) if bodies else rest.bodies
+        squares = np.sum(moving[:, :, 7:10] ** 2, axis=2)  # of speeds
         metrics: dict[str, float | None] = {
             "farthest": max(gone.values()),
             "tilt": max(tilts.values()),
             "sunk": 1000 * deepest(scene, ends),
             "restless": 1000 * float(np.sqrt(np.mean(squares))) if bodies else None,
-            "energy": 1e6 * kinetic_energy(scene, rest.bodies) if bodies else None,
+            "energy": 1e6 * kinetic_energy(scene, moving) if bodies else None,
             "force_jitter": spread(scene, forces),
         }
         if self.premises:

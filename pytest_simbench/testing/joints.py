@@ -4,6 +4,7 @@ feel a share of gravity or are held together, of joints that move together, of p
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -183,13 +184,19 @@ def links_feel_their_share_of_gravity(subject: Subject) -> None:
 @check(Capability.COUPLINGS)
 def joints_move_together(subject: Subject) -> None:
     """A lever falls and turns another one, -0.5 times as far and from 0.2 rad: within 5 mrad, and
-    as fast as both inertias let it (2 %)."""
-    pair = Coupling("turned", "falling", -0.5, 0.2)
-    turned = lever("turned", (0.0, 0.5, 0.0), start=0.2)
+    as fast as both inertias let it (2 %). So does one that turns a light one, -2 times as far."""
+    _move_together(subject, Coupling("turned", "falling", -0.5, 0.2), 1.0)
+    _move_together(subject, Coupling("turned", "falling", -2.0, 0.2), 0.2)
+
+
+def _move_together(subject: Subject, pair: Coupling, share: float) -> None:
+    """`share`: of the lever that is turned, its mass and inertia in those of the other."""
+    light = vector3(share * np.array(INERTIA))
+    turned = replace(lever("turned", (0.0, 0.5, 0.0), start=pair.offset, mass=share), inertia=light)
 
     def law(q: float, v: float) -> float:
-        torque = turning(q) + pair.ratio * turning(pair.ratio * q + pair.offset)
-        return torque / (ABOUT_AXIS * (1 + pair.ratio**2))
+        torque = turning(q) + pair.ratio * share * turning(pair.ratio * q + pair.offset)
+        return torque / (ABOUT_AXIS * (1 + share * pair.ratio**2))
 
     positions = moves_by(subject, lever("falling"), turned, law=law, couplings=(pair,))
     apart = positions[:, 1] - (pair.ratio * positions[:, 0] + pair.offset)

@@ -31,6 +31,7 @@ from pytest_simbench.parity.quantities import expected_quantities
 from pytest_simbench.parity.readback import remembering
 from pytest_simbench.scene import Scene, Trajectory
 from pytest_simbench.scene.pair_friction import combined
+from pytest_simbench.scene.pair_restitution import unlike
 from pytest_simbench.simulator import Simulator, SimulatorError, SimulatorInfo
 from pytest_simbench.simulator.info import alternatives, check_supported, importable
 from pytest_simbench.simulator.settings import changed
@@ -160,7 +161,7 @@ class Server:
         prepared = PreparedRobot(world.robot).links if world.robot and world.apart else {}
         links = [name for name, link in prepared.items() if link.shapes]
         world, inexact = combined(world, simulator.info.friction_rule, links)
-        excused = [inexact] if inexact else []
+        excused = [*filter(None, (inexact, unlike(world)))]
         simulator.load(world)
         self.scene = world
         acting = Acting.of(simulator, world)

@@ -30,7 +30,8 @@ OPTIONS = {
     "viscosity": AIR,
     "wind": AIR,
     "magnetic": "nothing in a scene is magnetic",
-    "disableflags": "gravity, contact and filterparent alone are carried; all else acts",
+    "disableflags": "gravity, contact and, but for what one joint joins, filterparent are "
+    "carried; all else acts",
     "enableflags": "a switch of MuJoCo's own",
 }
 

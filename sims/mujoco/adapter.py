@@ -26,7 +26,7 @@ from .pictures import DISABLED, camera, renderer
 from .readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from .reading import Reading
 from .settings import CHOSEN_ON, PROFILES, FileSettings, MuJoCoSettings
-from .world import build, gain, leave_out, shape_label
+from .world import ROUND, build, gain, leave_out, shape_label
 
 mujoco = lazy_import("mujoco")
 
@@ -54,11 +54,7 @@ class MuJoCo(Simulator):
         deviations=(
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
             Deviation("", BOUNCES, only="restitution"),
-            Deviation(
-                "",
-                "a round shape has a contact's friction its own, whatever it touches",
-                only="frictions",
-            ),
+            Deviation("", ROUND, only="frictions"),
         ),
         install_size_mb=60,
         environment=DISABLED,

@@ -75,7 +75,7 @@ def on_joints(reading: Reading) -> list[OnJoint]:
     joint_names: dict[str, int] = {}
     for body in range(1, model.nbody):
         count, first = int(model.body_jntnum[body]), int(model.body_jntadr[body])
-        if not count or body in free:
+        if not count or body in free | reading.soft:
             continue
         name, joints = reading.name("body", body), range(first, first + count)
         balls = [j for j in joints if model.jnt_type[j] == kinds.mjJNT_BALL]

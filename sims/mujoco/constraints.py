@@ -169,6 +169,13 @@ def apart(reading: Reading) -> tuple[Pairs, bool]:
     together = bool((meet[ask & both] > 0).any())
     never = ask & (meet == 0) & (~both | together)
     partly = ask & (meet > 0) & (meet < whole)
+    joined = [{f"link/{k.name}", f"link/{k.above.name}"} for k in reading.links if k.above]
+    for a, b in np.argwhere(ask & (meet > 0)):
+        if {names[a], names[b]} in joined:
+            partly[a, b] = False
+            reason = "in the file they collide, and links that one joint joins never do here"
+            told = [f"{names[a]} and {names[b]}"]
+            reading.tell("contact (of joined links)", NOT_CARRIED, reason, told)
     if never.any():
         told = [f"{names[a]} and {names[b]}" for a, b in np.argwhere(never)]
         reason = f"{len(told)} pairs do not collide"

@@ -60,6 +60,7 @@ class Reading:
     Attributes:
         ground: number of the plane that is the ground; None: the file has none.
         falls: whether gravity acts.
+        soft: numbers of the bodies that are points of what is soft, and nothing else.
         lift: height by which the scene is moved up [m].
 
     Raises:
@@ -83,6 +84,11 @@ class Reading:
         if len(self.solid) > MOST_SHAPES:
             told = f"{len(self.solid)} shapes collide, and {MOST_SHAPES} can; leave out some"
             raise self.refuse(told)
+        of_flex = {
+            int(body) for of in ("vert", "node") for body in getattr(model, f"flex_{of}bodyid", ())
+        }
+        parents = set(model.body_parentid.tolist())
+        self.soft = {b for b in of_flex - parents if b > 0 and not model.body_geomnum[b]}
         self.ground = self._find_ground()
         self.links = on_joints(self)
         try:
@@ -150,7 +156,7 @@ class Reading:
                 continue
             key = (root, root or body) if body else (0, -1 - geom)
             found.setdefault(key, []).append(geom)
-        roots = {b for b in range(1, model.nbody) if self.root(b) == b} - on_joints
+        roots = {b for b in range(1, model.nbody) if self.root(b) == b} - on_joints - self.soft
         empty = sorted(b for b in roots if (b, b) not in found)
         if empty:
             names = named(self.name("body", body) for body in empty)

@@ -31,6 +31,9 @@ ROBOT, WORLD, LED = 1, 2, 4
 """Collision groups: the robot's links touch everything but, unless asked, each other; prescribed
 bodies touch what they can move."""
 
+ROUND = "a round shape that spins or rolls on a rougher surface is braked about its contact, too"
+"""What it means that such a shape leaves the contact to the other."""
+
 LINK_COLOUR, GROUND_COLOUR = (0.9, 0.9, 0.9, 1.0), (0.5, 0.5, 0.5, 1.0)
 
 
@@ -53,9 +56,9 @@ def build(scene: Scene, prepared: PreparedRobot | None, settings: MuJoCoSettings
     )
     touches = WORLD | ROBOT
     _set_surface(ground, settings, scene.ground_friction, scene.ground_restitution, WORLD, touches)
-    most = heavy(scene)
+    most, roughest = heavy(scene), max(scene.frictions)
     for body in scene.bodies:
-        _add_body(spec, body, settings, most)
+        _add_body(spec, body, settings, most, roughest)
     spec.worldbody.add_light(pos=[0.5, 0, 3], dir=[0, 0, -1])
     return spec.compile()
 
@@ -109,13 +112,15 @@ def _set_surface(
     geom.contype, geom.conaffinity = group, touches
 
 
-def _add_body(spec: Any, part: Body, settings: MuJoCoSettings, most: float) -> None:
-    """`most`: mass and moments of a prescribed body [kg, kg m^2]."""
+def _add_body(
+    spec: Any, part: Body, settings: MuJoCoSettings, most: float, roughest: float
+) -> None:
+    """`most`: mass and moments of a prescribed body [kg, kg m^2]; `roughest`: largest friction."""
     body = spec.worldbody.add_body(
         name=part.name, pos=part.pose.position, quat=part.pose.quaternion
     )
     geoms = [
-        _add_shape(spec, body, shape_label(part, k), shape, settings)
+        _add_shape(spec, body, shape_label(part, k), shape, settings, roughest)
         for k, shape in enumerate(part.parts)
     ]
     if part.prescribed:
@@ -138,7 +143,9 @@ def shape_label(body: Body, k: int) -> str:
     return f"{body.name}/{k}" if k else body.name
 
 
-def _add_shape(spec: Any, body: Any, name: str, shape: Body, settings: MuJoCoSettings) -> Any:
+def _add_shape(
+    spec: Any, body: Any, name: str, shape: Body, settings: MuJoCoSettings, roughest: float
+) -> Any:
     """The geom of one shape of a body, at its place in the body's frame."""
     kind, size = _geom(shape)
     mesh = {}
@@ -156,8 +163,9 @@ def _add_shape(spec: Any, body: Any, name: str, shape: Body, settings: MuJoCoSet
     )
     _set_surface(geom, settings, shape.friction, shape.restitution, WORLD, WORLD | ROBOT)
     if not isinstance(shape, Box | ConvexMesh):
-        # contacts of a round shape neither roll nor spin with friction
-        geom.condim, geom.priority = 3, 1
+        # contacts of a round shape neither roll nor spin with friction; all else of them is its
+        # own, too, so it must be the roughest
+        geom.condim, geom.priority = 3, int(shape.friction == roughest)
     return geom
 
 

@@ -33,7 +33,7 @@ from ..mujoco.own_file import FileReadBack, loaded
 from ..mujoco.pictures import DISABLED, camera, renderer
 from ..mujoco.readback import Numbers, ReadBack, contact_forces, joint_wrenches
 from ..mujoco.settings import FileSettings
-from ..mujoco.world import MOST, gain, leave_out, shape_label
+from ..mujoco.world import MOST, ROUND, gain, leave_out, shape_label
 from .own_file import NewtonFile
 from .settings import CHOSEN_ON, PROFILES, NewtonSettings
 from .world import build_model, make_solver, names
@@ -68,6 +68,7 @@ class Newton(Simulator):
         deviations=(
             Deviation("", "contacts are soft by design: cubes sink in and creep a little"),
             Deviation("", BOUNCES, only="restitution"),
+            Deviation("", ROUND, only="frictions"),
             Deviation("", "the state is kept in single precision between steps"),
         ),
         costly_start=True,

@@ -48,10 +48,10 @@ def build_model(scene: Scene, prepared: PreparedRobot | None, settings: NewtonSe
     for body in scene.bodies:
         for k, part in enumerate(body.parts):
             if not isinstance(part, Box | ConvexMesh):
-                # contacts of a round shape neither roll nor spin with friction
+                # as in MuJoCo's own world
                 shape = model.shape_label.index(shape_label(body, k))
                 model.mujoco.condim.numpy()[shape] = 3
-                model.mujoco.geom_priority.numpy()[shape] = 1
+                model.mujoco.geom_priority.numpy()[shape] = body.friction == max(scene.frictions)
     model.mujoco.geom_solimp.numpy()[:] = (*settings.solimp, 0.5, 2.0)
     return model
 

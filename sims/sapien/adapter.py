@@ -3,8 +3,8 @@
 Drives are PhysX's own implicit springs in the joints of a reduced-coordinate articulation, force
 limited. A joint force set beside the drive would not count towards that limit, so the effort
 feed-forward rides on the position target: q* + tau_ff / k; the limit then clips the whole sum.
-Velocity targets are native. Joints are coupled by SAPIEN's tendons, with the stiffness that its
-URDF loader gives a mimic joint. See docs/engines/sapien.md.
+Velocity targets are native. Joints are coupled by SAPIEN's tendons, fingers with the stiffness that
+its URDF loader gives a mimic joint, others with less. See docs/engines/sapien.md.
 """
 
 from __future__ import annotations
@@ -27,7 +27,17 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 
-from .bodies import ROBOT, WORLD, Groups, add_body, add_ground, add_own, couple, groups_apart
+from .bodies import (
+    ROBOT,
+    WORLD,
+    Groups,
+    add_body,
+    add_ground,
+    add_own,
+    couple,
+    groups_apart,
+    soften,
+)
 from .drawing import Drawing
 from .readback import ReadBack
 from .settings import CHOSEN_ON, PROFILES, SAPIENSettings
@@ -170,8 +180,11 @@ class SAPIEN(Simulator):
             joint.set_armature([drive.armature])
             joint.set_friction(0.0 if drive.friction else self.settings.joint_friction)
             self._own.append(add_own(joint, drive, step))
-        for pair in (*robot.gripper.couplings, *robot.couplings):
-            couple(self._robot, pair, self.settings.coupling_stiffness)
+        stiffest = self.settings.coupling_stiffness
+        for pair in robot.gripper.couplings:
+            couple(self._robot, pair, stiffest)
+        for pair in robot.couplings:
+            couple(self._robot, pair, min(stiffest, soften(self._robot, pair, step)))
         self._closures = [self._close(prepared, closure) for closure in reduced(prepared)]
         for name, force in borne(prepared, self.scene.gravity, felt=0.0).items():
             self._links[name].disable_gravity = True

@@ -3,6 +3,7 @@ each by itself, and two together."""
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from typing import Any
 
@@ -16,6 +17,7 @@ from pytest_simbench.scene import (
     ConvexMesh,
     Coupling,
     Cylinder,
+    FloatArray,
     Joint,
     Scene,
     Sphere,
@@ -201,12 +203,33 @@ def couple(robot: Any, pair: Coupling, stiffness: float) -> None:
             f"sapien couples joints of one link alone: {pair.leader!r} is on {link.name!r}, "
             f"{pair.follower!r} on {follower.parent_link.name!r}"
         )
+    scale, pulls = _pulls(pair)
+    links, shares = [link, leader.child_link, follower.child_link], [0.0, *pulls]
+    rest = pair.offset / scale
+    robot.create_fixed_tendon(links, shares, shares, rest_length=rest, stiffness=stiffness)
+
+
+def _pulls(pair: Coupling) -> tuple[float, FloatArray]:
+    """What a tendon's length is divided by, and its coefficients of leader and follower."""
     scale = max(1.0, abs(pair.ratio))  # with larger coefficients joints stick, 0.2 rad apart
-    pulls = [0.0, -pair.ratio / scale, 1.0 / scale]
-    robot.create_fixed_tendon(
-        [link, leader.child_link, follower.child_link],
-        pulls,
-        pulls,
-        rest_length=pair.offset / scale,
-        stiffness=stiffness,
-    )
+    return scale, np.array([-pair.ratio, 1.0]) / scale
+
+
+SUBSTEP = 4e-5
+"""Of a robot with couplings beside its gripper's, at most [s]; PhysX has no more than 255 in a
+step. It solves the joints of a tendon by turns: from rest, the first takes more than its share of
+the torque, the more the stiffer the tendon is in a sub-step."""
+
+SOFT = 2e-3
+"""What a tendon there closes of its gap in a sub-step, at most."""
+
+
+def soften(robot: Any, pair: Coupling, timestep: float) -> float:
+    """Have the robot solved in such sub-steps; the stiffness of the tendon of a pair."""
+    count = max(robot.solver_position_iterations, min(255, math.ceil(timestep / SUBSTEP)))
+    robot.set_solver_position_iterations(count)
+    inertia = robot.create_pinocchio_model().compute_generalized_mass_matrix(robot.qpos)
+    order = [joint.name for joint in robot.active_joints]
+    pulls = np.zeros(len(order))
+    pulls[[order.index(pair.leader), order.index(pair.follower)]] = _pulls(pair)[1]
+    return float(SOFT * (count / timestep) ** 2 / (pulls @ np.linalg.solve(inertia, pulls)))

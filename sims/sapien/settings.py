@@ -19,7 +19,8 @@ class SAPIENSettings(Settings):
 
     Attributes:
         timestep: [s]; a new SAPIEN scene has 0.01.
-        position_iterations, velocity_iterations: of the solver, for bodies and articulation.
+        position_iterations, velocity_iterations: of the solver, for bodies and articulation; where
+            joints are coupled beside the gripper, more (`bodies.SUBSTEP`).
         tgs: temporal Gauss-Seidel solver instead of projected Gauss-Seidel.
         pcm: persistent contact manifolds.
         friction_every_iteration: friction is solved in every iteration, not only in the last ones.
@@ -30,7 +31,7 @@ class SAPIENSettings(Settings):
         angular_damping: of free bodies [1/s].
         link_damping: of the robot's links, linear and angular [1/s].
         joint_friction: coefficient of the friction of joints without their own.
-        coupling_stiffness: of the tendons that couple joints [N m/rad, N/m].
+        coupling_stiffness: of the tendons that couple fingers; of others at most [N m/rad, N/m].
     """
 
     timestep: Annotated[float, Log(1e-3, 0.01)] = 0.01

@@ -10,12 +10,12 @@ from dataclasses import replace
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
-from pytest_simbench.scene import Pose, Scene
+from pytest_simbench.scene import Cylinder, Pose, Scene
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import scenes
 from sims.mujoco.bounces import LARGEST, damping_ratio, direct, restitution_of
 
-from .worlds import loaded
+from .worlds import Worlds, loaded
 
 
 def left(stiffness: float, damping: float) -> float:
@@ -84,6 +84,17 @@ def test_the_driver_comes_with_the_first_picture() -> None:
         check=False,
     )
     assert found.stdout.strip() == "False True (48, 64, 3) True", found.stderr
+
+
+@pytest.mark.parametrize("name", ["mujoco", "newton"])
+def test_a_round_body_has_the_friction_of_the_pair(name: str) -> None:
+    """A smooth puck sticks on a rough ground that leans by 0.35."""
+    puck = Cylinder("puck", 0.06, 0.03, Pose.at(0, 0, 0.015), 1.0, 0.2)
+    scene = Scene("leaning", (puck,), None, (3.2, 0.0, -9.3), 0.5)
+    with Worlds(adapter(name)) as worlds:
+        world = worlds.load(scene)
+        world.wait(0.2)
+        assert abs(world.bodies[0, 7]) < 0.02
 
 
 @pytest.mark.parametrize("name", ["mujoco", "newton"])

@@ -238,6 +238,24 @@ def test_constraints_that_are_not_carried_say_why(kitchen: Path, held: str, why:
     assert re.search(why, reason)
 
 
+JOINED = """<mujoco>{}<worldbody>
+<body name="arm" pos="0 0 1"><joint/><geom name="upper" type="box" size=".1 .1 .1"/>
+<body name="hand" pos="0 0 .4"><joint axis="1 0 0"/><geom name="fore" size=".1"/></body></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    "told",
+    ['<option><flag filterparent="disable"/></option>',
+     '<contact><pair geom1="upper" geom2="fore"/></contact>'],
+)  # fmt: skip
+def test_joined_links_that_meet_in_the_file_are_told(tmp_path: Path, told: str) -> None:
+    path = tmp_path / "two.xml"
+    path.write_text(JOINED.format(told))
+    (line,) = (a for a in Reading(str(path)).account if a.quantity == "contact (of joined links)")
+    assert (line.state, line.where) == ("not carried", "link/arm and link/hand")
+
+
 @pytest.mark.parametrize("other", ["world", "arm", "led"])
 @pytest.mark.parametrize("kind", ["weld", "connect"])
 def test_constraints_of_free_bodies_say_what_may_part(kitchen: Path, kind: str, other: str) -> None:

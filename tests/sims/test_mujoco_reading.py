@@ -253,6 +253,16 @@ def test_what_masks_and_exclusions_keep_apart(
     assert found == set(map(frozenset, pairs))
 
 
+@pytest.mark.parametrize("dof", ["full", "trilinear"])
+def test_bodies_of_what_is_soft_alone_are_left_out(tmp_path: Path, dof: str) -> None:
+    grid = 'name="jelly" type="grid" count="3 3 3" spacing=".1 .1 .1" dim="3"'
+    soft = f'<flexcomp {grid} dof="{dof}"/>'
+    reading = read(tmp_path, SMALL.replace("</worldbody>", soft + "</worldbody>"))
+    assert reading.scene.robot is None
+    assert reading.scene.bodies == read(tmp_path).scene.bodies
+    assert ("flex", "jelly") in [(line.quantity, line.where) for line in reading.account]
+
+
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_compensated_gravity_is_a_force(tmp_path: Path, share: float) -> None:
     text = SMALL.replace('name="box"', f'name="box" gravcomp="{share}"')

@@ -68,6 +68,26 @@ def test_couplings_hold_at_any_ratio(ratio: float) -> None:
     assert abs(leads) > 0.2
 
 
+@pytest.mark.parametrize("mass", [0.05, 20.0])
+def test_coupled_levers_fall_as_fast_as_both_let_them(mass: float) -> None:
+    """One turns another of a fifth its mass, -2 times as far; a stiff tendon had it not fall."""
+    parts = [
+        Part(name, Y, offset, (0.05, 0.0, 0.0), m, (4e-4 * m,) * 3, on="mount")
+        for name, offset, m in (("falling", (0, 0, 0), mass), ("turned", (0, 0.5, 0), mass / 5))
+    ]
+    robot = mechanism("coupled", *parts, couplings=(Coupling("turned", "falling", -2.0),))
+    with world(Scene("coupled", robot=robot)) as made:
+        stepped(made, 0.12)
+        leads, follows = made.joint_state()[0]
+
+    def law(q: float, v: float) -> float:
+        torque = 0.05 * joints.G * (np.cos(q) - 2 / 5 * np.cos(-2 * q))
+        return float(torque / ((0.05**2 + 4e-4) * (1 + 4 / 5)))
+
+    right = joints.followed(law, np.array([0.0, 0.12]))[-1]
+    assert [leads, follows] == pytest.approx([right, -2 * right], rel=0.04)
+
+
 def test_joints_of_two_links_are_not_coupled() -> None:
     second = Part("second", Y, (0.3, 0.0, 0.0))
     pair = Coupling("second", "first")

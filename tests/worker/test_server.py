@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import execnet
@@ -185,6 +186,12 @@ def test_what_was_built_is_held_against_the_scene(ask: Asked) -> None:
     )
     assert ask.load(parity=False)["excused"] == []
     assert ask("misfit", names=["cube"]) == 0.0
+
+
+def test_restitutions_that_differ_are_told(ask: Asked) -> None:
+    ask.construct()
+    answer = ask("load", scene=replace(SCENE, ground_restitution=0.5).to_wire(), parity=False)
+    assert "restitution (0, 0.5)" in answer["excused"][0]
 
 
 def test_a_deviation_of_other_shapes_excuses_nothing(ask: Asked) -> None:
