@@ -90,8 +90,9 @@ def test_example_workflow(pytester: pytest.Pytester) -> None:
     smallest = ("--protocol=smoke", "--reps=1")
     assert pytester.runpytest_subprocess(*save, *smallest).ret == 0
     result = pytester.runpytest_subprocess(*gate, *smallest)
-    assert result.ret == 0
-    result.stdout.fnmatch_lines(["no metric got worse beyond its limit"])
+    assert result.ret == 1
+    (told,) = {line for line in result.outlines if line.startswith("FAILED")}
+    assert told == "FAILED no limit can fail with so few repetitions; raise --reps in both runs"
 
 
 def test_build_workflow(pytester: pytest.Pytester) -> None:
