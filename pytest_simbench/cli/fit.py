@@ -27,6 +27,7 @@ from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.files import shown
 from pytest_simbench.report.terminal.grid import aligned
+from pytest_simbench.scene.pair_friction import OF_PAIRS
 from pytest_simbench.tasks import Fitting
 from pytest_simbench.tuning.fitting import Fit, State
 from pytest_simbench.tuning.search import folder_name
@@ -94,7 +95,7 @@ def fit(
             return INTERRUPTED
         print(for_terminal("\n".join(_lines(results, fitting, found))))
         with refusing(OSError, str(path)):
-            write_whole(path, RESULT, _written(results).encode())
+            write_whole(path, RESULT, _written(results, found).encode())
         print(f"values: {shown(path / RESULT, Path.cwd())}")
     return 0
 
@@ -118,13 +119,25 @@ def _lines(results: Sequence[Told], fitting: Fit, found: State) -> Iterator[str]
     for name, times in fitting.misfit(found.columns).items():
         off = f"{name} is {significant(times)} times the noise off"
         yield f"{off}: no values were found that explain it"
+    for name, text in _warned(results, found).items():
+        yield f"{name} may be wrong where such surfaces touch: {text}"
     yield f"{fitting.looks} repetitions"
 
 
-def _written(results: Sequence[Told]) -> str:
-    rows = {
+def _warned(results: Sequence[Told], found: State) -> dict[str, str]:
+    """By the name of a friction that was sought: that pairs do not have the scene's."""
+    told = "; ".join(text for text in found.record.deviations if text.startswith(OF_PAIRS))
+    names = (one.unknown.name for one in results)
+    return {name: told for name in names if told and name.startswith("friction:")}
+
+
+def _written(results: Sequence[Told], found: State) -> str:
+    rows: dict[str, dict[str, float | str]] = {
         one.unknown.name: {"value": one.value, "low": one.low, "high": one.high}
         for one in results
         if not one.why
     }
+    for name, text in _warned(results, found).items():
+        if name in rows:
+            rows[name]["warning"] = text
     return json.dumps(rows, indent=1) + "\n"

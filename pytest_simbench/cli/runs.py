@@ -18,7 +18,7 @@ from pathlib import Path
 
 from pytest_simbench.cli.values import BadInput, refusing
 from pytest_simbench.experiment.identity import file_stem_of
-from pytest_simbench.ground.text import for_terminal
+from pytest_simbench.ground.text import for_terminal, in_one_line
 from pytest_simbench.measure.settling import TASK as SETTLING
 from pytest_simbench.records.folder import RECORDS, TASKS, RunContents, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
@@ -38,6 +38,7 @@ from pytest_simbench.report.model.outcome import RunOutcome
 from pytest_simbench.report.model.report import Report
 from pytest_simbench.report.page import PAGE_NAME
 from pytest_simbench.report.replay.recorded import FOLDER, write_bags
+from pytest_simbench.report.terminal.grid import fill
 from pytest_simbench.report.terminal.parts import (
     claim_lines,
     render_changes,
@@ -46,7 +47,8 @@ from pytest_simbench.report.terminal.parts import (
     sweep_lines,
 )
 from pytest_simbench.report.terminal.progress import Progress
-from pytest_simbench.report.terminal.run import render_brief, render_run, render_section
+from pytest_simbench.report.terminal.run import render_brief, render_run, render_section, warnings
+from pytest_simbench.scene.pair_friction import OF_PAIRS
 
 RUNS = ".simbench"
 """Where runs lie for which no folder is given."""
@@ -187,7 +189,10 @@ def sections(written: Report, width: int, verbose: bool) -> Iterator[tuple[str, 
         claims = [claim_lines(written.claims, width), ""] if written.claims else []
         brief = [s for s in written.summaries if s.task != SETTLING or not written.settled]
         table = render_run(written.summaries, width) if verbose else render_brief(brief, width)
-        yield "simulator comparison", "\n".join([*claims, table])
+        alone = [s for s in written.summaries if s not in brief and not verbose]
+        pairs = [in_one_line(line) for line in warnings(alone) if OF_PAIRS in line]
+        told = for_terminal("\n".join(fill(line, width, "  ") for line in pairs))
+        yield "simulator comparison", "\n".join([*claims, table, *filter(None, [told])])
     if written.sweeps:
         yield sweep.TITLE, for_terminal("\n".join(sweep_lines(written.sweeps, width, verbose)))
     if written.histories:

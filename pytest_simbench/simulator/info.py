@@ -158,8 +158,9 @@ class SimulatorInfo:
         install_size_mb: what installing it adds on disk, rounded [MB].
         language: in which the engine is written.
         friction_rule: what the engine, as its adapter sets it, makes of the frictions of two
-            surfaces: one of `scene.friction.RULES`; empty: not known, which is told of scenes
-            of several frictions.
+            surfaces: one of `scene.friction.RULES`, or several joined by `|`, of which it takes
+            the scene's, and the first where that is another; empty: not known, which is told of
+            scenes of several frictions.
         reads: endings of the files that it makes scenes of, see `Simulator.read_file`.
     """
 
@@ -196,7 +197,7 @@ class SimulatorInfo:
                 raise SimulatorError(f"info.{name} of {self.name}: give {told}")
         if not all(isinstance(item, Capability) for item in self.capabilities):
             raise SimulatorError(f"info.capabilities of {self.name}: give Capability.named('...')")
-        if self.friction_rule and self.friction_rule not in RULES:
+        if self.friction_rule and not {*self.friction_rule.split("|")} <= {*RULES}:
             told = f"{self.friction_rule!r} is none; choose from {', '.join(RULES)}"
             raise SimulatorError(f"info.friction_rule of {self.name}: {told}")
 

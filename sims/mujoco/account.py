@@ -173,7 +173,8 @@ def _tell_shapes(reading: Reading) -> None:
     reading.tell(
         "geom friction (sliding)",
         CARRIED,
-        f"{values_of(np.array(sorted(scene.frictions)))}; of two surfaces the larger counts",
+        f"{values_of(np.array(sorted(scene.frictions)))}; of two surfaces the larger counts, "
+        "where the run tells no other",
     )
     masks = np.stack([model.geom_contype, model.geom_conaffinity], axis=1)
     if seen := np.flatnonzero(~masks.any(axis=1)).tolist():

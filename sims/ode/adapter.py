@@ -15,6 +15,7 @@ import numpy as np
 
 from pytest_simbench.description.links import borne, joined, reduced
 from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene.friction import RULES
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
@@ -65,7 +66,7 @@ class ODE(Simulator):
         engine="ODE",
         language="C++",
         tested_version="1.2.0.dev15",
-        friction_rule="minimum",
+        friction_rule="|".join(RULES),
         capabilities=Capability.named(
             "save_restore contact_count contact_forces compound loops couplings apart "
             "self_collide joint_wrenches deterministic"
@@ -107,7 +108,12 @@ class ODE(Simulator):
         world.setAutoDisableFlag(s.sleeping)
         world.setAutoDisableTime(1.0)
         self.contacts = Contacts(
-            world, s.contact_erp, s.contact_cfm, s.contacts, s.friction == "slip"
+            world,
+            s.contact_erp,
+            s.contact_cfm,
+            s.contacts,
+            s.friction == "slip",
+            RULES[scene.friction_rule],
         )
         space = self.contacts.space
         self._advance = world.step if s.solver == "step" else world.quickStep

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -59,7 +59,7 @@ class Surface:
 
     Attributes:
         body: of ODE, its origin the centre of mass; None for what is fixed.
-        friction: Coulomb's coefficient; a pair has the smaller one.
+        friction: Coulomb's coefficient.
         bounce: coefficient of restitution; a pair has the smaller one.
     """
 
@@ -106,6 +106,7 @@ class Contacts:
         along: where a contact slips, all of its friction acts along the slip, as Coulomb's does.
             Otherwise ODE chooses two directions, and friction holds up to mu times the load in
             each of them, together up to 1.4 times that.
+        rule: makes the friction of two surfaces that differ of theirs.
 
     Attributes:
         space: that all geoms are in.
@@ -114,8 +115,17 @@ class Contacts:
         apart: pairs of surfaces that do not collide, by their ids.
     """
 
-    def __init__(self, world: Any, erp: float, cfm: float, most: int, along: bool) -> None:
+    def __init__(
+        self,
+        world: Any,
+        erp: float,
+        cfm: float,
+        most: int,
+        along: bool,
+        rule: Callable[[Any, Any], Any],
+    ) -> None:
         self.world, self.erp, self.cfm, self.most, self.along = world, erp, cfm, most, along
+        self.rule = rule
         self.space = ode.SimpleSpace()
         self.made: list[tuple[Any, Surface, Surface]] = []
         self.apart: set[frozenset[int]] = set()
@@ -170,7 +180,9 @@ class Contacts:
         if len(contacts) > self.most:
             contacts.sort(key=_depth, reverse=True)
             del contacts[self.most :]
-        friction, bounce = min(a.friction, b.friction), min(a.bounce, b.bounce)
+        friction, bounce = a.friction, min(a.bounce, b.bounce)
+        if friction != b.friction:
+            friction = float(self.rule(friction, b.friction))
         world, group, joint = self.world, self._group, self._joint
         mode = self._mode | self._bouncy if bounce else self._mode
         along = ode.ContactFDir1 | ode.ContactMu2

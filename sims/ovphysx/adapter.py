@@ -62,7 +62,7 @@ class OvPhysX(Simulator):
         language="C++",
         tested_version="0.7.0.74035321",
         oldest_version="0.7.0.74035321",  # older ones tell no joint before the first step
-        friction_rule="mean",
+        friction_rule="|".join(usd.COMBINED),
         capabilities=Capability.named(
             "deterministic save_restore contact_forces compound loops couplings apart "
             "self_collide joint_wrenches"

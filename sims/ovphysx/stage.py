@@ -44,6 +44,9 @@ _BODY = ("PhysicsRigidBodyAPI", "PhysxRigidBodyAPI", "PhysicsMassAPI")
 BOUNDLESS = 1e9
 """Largest effort of a joint's spring whose drive leaves it free [N m or N]."""
 
+COMBINED = {"mean": "average", "maximum": "max", "minimum": "min"}
+"""PhysX's words for rules of friction."""
+
 _REPORT = "float physxContactReport:threshold = 0"
 
 
@@ -121,20 +124,20 @@ class Stage:
         return usd.prim("PhysicsScene", "physics", ("PhysxSceneAPI",), lines)
 
     def _materials(self) -> list[str]:
-        """One material a pair of coefficients, static and dynamic friction alike.
-
-        PhysX combines two by their average, which is the scene's value for equal surfaces.
-        """
+        """One material a pair of coefficients, static and dynamic friction alike, that PhysX
+        combines by the scene's rule. Of restitution it takes the average."""
         surfaces = {(body.friction, body.restitution) for body in self.scene.bodies}
         surfaces.add((self.scene.ground_friction, self.scene.ground_restitution))
         if self.scene.robot is not None:
             surfaces.add((self.scene.robot.friction, 0.0))
+        mode = COMBINED.get(self.scene.friction_rule, "average")  # of equal ones all are the same
         return [
             usd.prim(
                 "Material",
                 _material(friction, restitution),
-                ("PhysicsMaterialAPI",),
+                ("PhysicsMaterialAPI", "PhysxMaterialAPI"),
                 [
+                    f'uniform token physxMaterial:frictionCombineMode = "{mode}"',
                     f"float physics:staticFriction = {float(friction)!r}",
                     f"float physics:dynamicFriction = {float(friction)!r}",
                     f"float physics:restitution = {float(restitution)!r}",

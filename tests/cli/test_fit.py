@@ -14,6 +14,7 @@ import pytest
 from pytest_simbench.cli.fit import _lines, _OutOfTime, _written
 from pytest_simbench.cli.main import main
 from pytest_simbench.scene import Start
+from pytest_simbench.scene.pair_friction import OF_PAIRS
 from pytest_simbench.tuning.fitting import Fit
 from pytest_simbench.tuning.telling import Told
 from pytest_simbench.tuning.unknowns import Unknown
@@ -146,16 +147,19 @@ def test_no_unknown_and_no_time(folder: Path, capsys: pytest.CaptureFixture[str]
 
 def test_all_that_is_said_of_a_fit() -> None:
     """Of what is determined and what is not, of joints that turn and slide, and of a misfit."""
-    values = (("mass:drawer", 1.0, 2.34567, ""), ("spring:slider", 90.0, 1e-4, "no end below"))
+    values = (("mass:drawer", 1.0, 2.34567, ""), ("spring:slider", 90.0, 1e-4, "no end below"),
+              ("friction:ground", 0.5, 0.25, ""))  # fmt: skip
     results = [Told(Unknown(name, was, was / 10, was * 10), now, now / 2, now * 2, why)
                for name, was, now, why in values]  # fmt: skip
     log = SimpleNamespace(joints=["hinge", "slider"], start=Start((), ()))
     first, last = (SimpleNamespace(metrics={"off": off, "turned": None}) for off in (12.345, 0.98))
+    last.deviations = ("soft", wrong := f"{OF_PAIRS}not the scene's: of a and b it is 0.6, not 1")
     found: Any = SimpleNamespace(columns=["slider"], record=last)
     fitting: Any = SimpleNamespace(
         scene=SCENE, log=log, looks=17, first=first, misfit=lambda of: dict.fromkeys(of, 4.5678)
     )
     assert_approved("fit", "\n".join(_lines(results, fitting, found)))
-    assert json.loads(_written(results)) == {
-        "mass:drawer": {"value": 2.34567, "low": 2.34567 / 2, "high": 2.34567 * 2}
+    assert json.loads(_written(results, found)) == {
+        "mass:drawer": {"value": 2.34567, "low": 2.34567 / 2, "high": 2.34567 * 2},
+        "friction:ground": {"value": 0.25, "low": 0.125, "high": 0.5, "warning": wrong},
     }

@@ -11,15 +11,18 @@ from pathlib import Path
 
 import pytest
 
-from pytest_simbench.cli.runs import merge_runs, report_runs
+from pytest_simbench.cli.runs import merge_runs, report_runs, sections
 from pytest_simbench.cli.values import BadInput
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.description import TaskDescription
-from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.files import write_outcome
 from pytest_simbench.report.model.outcome import RunOutcome
+from pytest_simbench.report.model.report import Report
+from pytest_simbench.scene.pair_friction import OF_PAIRS
 from tests.approval import assert_approved
+from tests.measure import test_settling
 from tests.records.build import record
 from tests.report.model.test_claims import claim
 from tests.report.model.test_laws import ERROR, LAWS
@@ -220,3 +223,13 @@ def test_all_that_is_said_of_two_runs_together(
     ends += [report_runs(["b", "a"], output="both"), merge_runs(["b", "a"], output="whole")]
     texts = [(here / name).read_text() for name in ("badge.json", "whole/outcome.json")]
     assert_approved("said-together", "\n".join([capsys.readouterr().out, str(ends), *texts]))
+
+
+def test_wrong_frictions_in_a_scene_are_told_once() -> None:
+    """Also of a scene that has a section of its own; the whole tables tell them beside others."""
+    wrong = f"{OF_PAIRS}not the scene's: of a and b it is 0.6, not 1"
+    records = tuple(test_settling.end(who, 0.0, deviations=("soft", wrong)) for who in "ab")
+    _, (_, text) = sections(Report.of(RunContents(records=records)), 200, False)
+    assert text.count(wrong) == 1
+    assert f"note: all: {wrong}" in text
+    assert "soft" not in text

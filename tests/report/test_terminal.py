@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -13,6 +14,7 @@ from pytest_simbench.report.model.document import Column
 from pytest_simbench.report.model.summary import TaskSummary, summarise
 from pytest_simbench.report.terminal.grid import render
 from pytest_simbench.report.terminal.run import MOST_LINES, render_brief, render_run, render_task
+from pytest_simbench.scene.pair_friction import OF_PAIRS
 from tests.approval import assert_approved
 
 from .samples import METRICS, REFERENCES, failed, record, stacking_run, throwing_run
@@ -98,6 +100,12 @@ def test_notes_of_one_text_stand_together_and_say_what_is_not_described() -> Non
     report = render_brief(summarise(run_of_eight(contended=True), METRICS), 100)
     assert report.count("note:") == 1
     assert "note: all: repetitions ran in parallel: its times and CPU are contended" in report
+    wrong = f"{OF_PAIRS}not the scene's: of a and b it is 0.6, not 1"
+    both = [record(simulator=name, deviations=("soft", wrong)) for name in ("drake", "dart")]
+    twice = [*both, *(replace(one, task="throwing") for one in both), record()]
+    report = render_brief(summarise(twice, METRICS), 100)
+    assert report.count("note:") == 1
+    assert f"note: dart, drake: {wrong}" in report
     undescribed = render_brief(summarise([record(metrics={"placed": 1.0})], {}), 100)
     assert "note: stacking: the run does not say what its metrics mean" in undescribed
 

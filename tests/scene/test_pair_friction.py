@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from pytest_simbench.scene import Box, Pose, Scene, SceneError
 from pytest_simbench.scene.friction import RULES
-from pytest_simbench.scene.pair_friction import combined
+from pytest_simbench.scene.pair_friction import OF_PAIRS, combined
 from pytest_simbench.testing import scenes
 from tests.approval import assert_approved_message
 from tests.scene.test_bodies import SHAPES, thing
@@ -66,7 +66,7 @@ def test_the_bowl_s_frictions_are_exact_by_a_mean_and_not_by_the_smaller_one() -
         assert problem == ""
         assert of_pairs(made) == pytest.approx([1.0, 1.0, 0.95], abs=1e-3)
     made, problem = combined(own, "minimum")
-    assert "of cube0 and thing it is off by 0.05" in problem
+    assert "of cube0 and thing it is 1, not 0.95 (" in problem
     assert_approved_message(problem)
     assert of_pairs(made) == pytest.approx([1.0, 1.0, 1.0])
 
@@ -93,6 +93,73 @@ def test_what_all_links_are_kept_apart_from_does_not_touch_the_robot() -> None:
         assert combined(own, "minimum", links)[0].ground_friction == mu
 
 
+def sliding() -> Scene:
+    """A puck and a block lie on a floor; a table stands and an arm hangs elsewhere."""
+    puck = Box("puck", (0.1,) * 3, Pose.at(0.5, 0, 0.05), 1.0, 0.2)
+    block = Box("block", (0.1,) * 3, Pose.at(0.5, 1, 0.0509), 1.0, 0.8)
+    table = Box("table", (0.2,) * 3, Pose.at(-1, 2, 0.1), friction=1.0)
+    return Scene("s", (puck, block, table), scenes.arm(), ground_friction=0.2)
+
+
+@pytest.mark.parametrize("rule", sorted(RULES))
+def test_what_touches_at_the_start_is_exact(rule: str) -> None:
+    made, problem = combined(sliding(), rule)
+    assert of_pairs(made)[:2] == pytest.approx([0.2, 0.8])
+    assert bool(problem) == (rule != "maximum")
+    assert "ground and puck" not in problem
+
+
+@pytest.mark.parametrize("rule", sorted(RULES))
+def test_a_block_between_ground_and_hand_has_both_its_frictions(rule: str) -> None:
+    block = Box("block", (0.1,) * 3, Pose.at(0.5, 0, 0.05), 1.0, 0.3)
+    made, problem = combined(Scene("s", (block,), scenes.arm(), ground_friction=0.3), rule)
+    robot, [box] = made.arm, made.bodies
+    pairs = RULES[rule](np.array([made.ground_friction, robot.friction]), box.friction)
+    assert pairs == pytest.approx([0.3, 1.0])
+    assert problem.startswith(OF_PAIRS + "not") == (rule in ("harmonic", "minimum"))
+    assert f"{robot.name} it is" in problem or not problem
+
+
+@pytest.mark.parametrize("rule", ["mean", "geometric", "harmonic"])
+@given(data=st.data())
+def test_bodies_on_the_ground_have_their_frictions_there(rule: str, data: st.DataObject) -> None:
+    ground, *frictions = data.draw(st.lists(st.floats(0.05, 2.0), min_size=4, max_size=6))
+    own = scene("maximum", ground, *frictions)
+    last = own.bodies[-1]
+    low = float(last.reach_placed(np.array([[0.0, 0.0, -1.0]]))[0])
+    own = own.with_pose(last.name, last.pose * Pose.at(0, 0, low))
+    made, problem = combined(own, rule)
+    count = len(frictions)
+    assert of_pairs(made)[:count] == pytest.approx(of_pairs(own)[:count], rel=1e-3)
+    assert "ground" not in problem
+
+
+def test_the_worst_pair_that_touches_is_told_first() -> None:
+    cubes = [
+        Box(f"cube{k}", (0.1,) * 3, Pose.at(0.1 * k, 0, 0.05), 1.0, mu)
+        for k, mu in enumerate((0.2, 0.2, 0.9))
+    ]
+    far = Box("far", (0.1,) * 3, Pose.at(1, 0, 0.05), 1.0, 4.0)
+    made, problem = combined(Scene("s", (*cubes, far), ground_friction=0.2), "minimum")
+    assert "the scene's: of the ground and cube1 it is 0.9, not 0.2; " in problem
+    assert_approved_message(problem)
+    assert of_pairs(made)[:4] == pytest.approx([0.2, 0.9, 0.9, 4.0])
+
+
+def test_an_engine_of_several_rules_has_the_scene_s() -> None:
+    own = sliding()
+    assert combined(own, "mean|maximum") == (own, "")
+    assert combined(own, "mean|minimum") == combined(own, "mean")
+
+
+def test_an_engine_of_no_rule_keeps_the_frictions_and_that_is_told() -> None:
+    own = sliding()
+    made, problem = combined(own, "")
+    assert made == own
+    assert problem.startswith(OF_PAIRS)
+    assert_approved_message(problem)
+
+
 def test_links_that_collide_keep_their_own_friction_or_that_they_do_not_is_told() -> None:
     robot = replace(scenes.arm(), friction=0.0, self_collide=True)
     own = Scene("s", robot=robot, ground_friction=0.5)
@@ -100,7 +167,7 @@ def test_links_that_collide_keep_their_own_friction_or_that_they_do_not_is_told(
     assert problem == ""
     assert sorted(made.frictions) == pytest.approx([0.0, 1.0])
     _, problem = combined(own, "minimum")
-    assert f"of {robot.name} and itself it is off by 0.5" in problem
+    assert f"of {robot.name} and itself it is 0.5, not 0" in problem
     own = replace(own, robot=replace(robot, self_collide=False))
     made, _ = combined(own, "mean")
     assert [made.ground_friction, made.arm.friction] == pytest.approx([0.5, 0.5])

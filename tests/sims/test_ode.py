@@ -21,7 +21,18 @@ from pytest_simbench.client.errors import EngineFailed, Unavailable
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.laws.mechanisms import Part, Y, mechanism
-from pytest_simbench.scene import ConvexMesh, Coupling, FloatArray, Pose, Robot, Scene, Trajectory
+from pytest_simbench.scene import (
+    Box,
+    ConvexMesh,
+    Coupling,
+    FloatArray,
+    Pose,
+    Robot,
+    Scene,
+    Trajectory,
+)
+from pytest_simbench.scene.friction import RULES
+from pytest_simbench.scene.pair_friction import OF_PAIRS
 from pytest_simbench.testing import scenes
 from tests.conftest import case_of, performed
 from tests.tiny import Falling
@@ -215,6 +226,22 @@ def test_joints_of_no_common_link_are_refused(worlds: Worlds) -> None:
     robot = mechanism("far", LEVER, ON_LEVER, far, couplings=(pair,))
     with pytest.raises(Unavailable, match="rack and lever have none in common"):
         worlds.load(Scene("far", robot=robot))
+
+
+@pytest.mark.parametrize("rule", sorted(RULES))
+def test_pairs_have_the_scene_s_friction_whatever_else_there_is(worlds: Worlds, rule: str) -> None:
+    frictions, pull = [0.3, 0.7, 0.9], (9.81, 0.0, -9.81)
+    pucks = tuple(
+        Box(f"puck {k}", (0.2, 0.2, 0.02), Pose.at(0.0, float(k), 0.01), 1.0, mu)
+        for k, mu in enumerate(frictions)
+    )
+    scene = Scene("pucks", pucks, None, pull, ground_friction=0.5, friction_rule=rule)
+    world = worlds.load(scene)
+    assert not any(told.startswith(OF_PAIRS) for told in world.excused)
+    world.wait(0.2)
+    speeds = world.bodies[:, 7]
+    held = [RULES[rule](0.5, mu) for mu in frictions]
+    np.testing.assert_allclose(speeds, 9.81 * 0.2 * (1 - np.array(held)), rtol=0.02)
 
 
 def test_a_convex_body_may_touch_the_mesh_of_a_link(worlds: Worlds) -> None:

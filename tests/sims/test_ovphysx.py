@@ -11,7 +11,9 @@ import pytest
 from pytest_simbench.sims.ovphysx.adapter import OvPhysX
 
 from pytest_simbench.client.environments import missing
-from pytest_simbench.scene import Trajectory
+from pytest_simbench.scene import Box, Pose, Scene, Trajectory
+from pytest_simbench.scene.friction import RULES
+from pytest_simbench.scene.pair_friction import OF_PAIRS
 from pytest_simbench.tasks import Jitter, Nesting
 from pytest_simbench.testing import Subject, scenes
 
@@ -41,6 +43,22 @@ def test_bowls_that_lie_in_each_other_are_no_larger_than_they_are() -> None:
     """Parity looks when the world is loaded."""
     with Subject(OvPhysX).world(Nesting(2).scene(1, Jitter())) as world:
         assert len(world.bodies) == 2
+
+
+@pytest.mark.parametrize("rule", ["maximum", "mean", "minimum"])
+def test_pairs_have_the_scene_s_friction_whatever_else_there_is(rule: str) -> None:
+    frictions, pull = [0.3, 0.7, 0.9], (9.81, 0.0, -9.81)
+    pucks = tuple(
+        Box(f"puck {k}", (0.2, 0.2, 0.02), Pose.at(0.0, float(k), 0.01), 1.0, mu)
+        for k, mu in enumerate(frictions)
+    )
+    scene = Scene("pucks", pucks, None, pull, ground_friction=0.5, friction_rule=rule)
+    with Subject(OvPhysX).world(scene) as world:
+        assert not any(told.startswith(OF_PAIRS) for told in world.excused)
+        world.wait(0.2)
+        speeds = world.bodies[:, 7]
+    held = [RULES[rule](0.5, mu) for mu in frictions]
+    np.testing.assert_allclose(speeds, 9.81 * 0.2 * (1 - np.array(held)), rtol=0.02)
 
 
 def test_threads_change_nothing() -> None:

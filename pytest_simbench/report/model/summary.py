@@ -29,6 +29,7 @@ from pytest_simbench.report.model.pooling import (
     pooled_by_phase,
     spread,
 )
+from pytest_simbench.scene.pair_friction import OF_PAIRS
 
 PHASES = ("launch", "compile", "load", "plan", "policy", "step", "other")
 """Where the wall time of a repetition goes, in order."""
@@ -237,11 +238,13 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row
     first, results = records[0], ResultSet(records, metrics)
     done = results.ok
     notes = list(dict.fromkeys(r.notes.untested for r in records if r.notes.untested))
+    told = dict.fromkeys(text for r in records for text in r.deviations)
+    notes += [text for text in told if text.startswith(OF_PAIRS)]
     again = published_again((r.task, r.seed, r.notes.sample, r.notes.chosen_on) for r in done)
     notes += [again] * bool(again)
     without = {m.name: results.without(m) for m in metrics}
-    if told := [f"{k} {n} of {len(done)}" for k, n in without.items() if 0 < n < len(done)]:
-        notes.append(f"finished repetitions without a value: {', '.join(told)}")
+    if lacking := [f"{k} {n} of {len(done)}" for k, n in without.items() if 0 < n < len(done)]:
+        notes.append(f"finished repetitions without a value: {', '.join(lacking)}")
     if any(record.contended for record in done):
         notes.append("repetitions ran in parallel: its times and CPU are contended")
     if any(record.notes.filmed for record in done):
@@ -270,7 +273,7 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row
         by_phase=pooled_by_phase([r.resources for r in done]),
         seconds=_seconds(done),
         causes=tuple(map(Cause, results.causes().values())),
-        deviations=tuple(dict.fromkeys(text for r in records for text in r.deviations)),
+        deviations=tuple(told),
         notes=tuple(notes),
         reasons=_reasons(done),
         records=records,
