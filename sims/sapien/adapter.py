@@ -21,6 +21,7 @@ from pytest_simbench.scene import Closure, FloatArray, Scene
 from pytest_simbench.simulator import (
     Capability,
     Deviation,
+    NotSupportedError,
     PreparedRobot,
     Simulator,
     SimulatorInfo,
@@ -280,6 +281,10 @@ class SAPIEN(Simulator):
     def joint_wrenches(self) -> FloatArray:
         if self._robot is None:
             return np.empty((0, 6))
+        if any(self._own) or self._closures:  # PhysX does not tell what such constraints carry
+            raise NotSupportedError(
+                "sapien tells no wrenches of joints with springs, damping or friction, or of loops"
+            )
         told = np.asarray(self._robot.get_link_incoming_joint_forces(), dtype=float)
         links, rows = list(self._robot.links), []
         for joint in self._joints:

@@ -17,6 +17,7 @@ from pytest_simbench.sims.sapien.adapter import SAPIEN
 from pytest_simbench.sims.sapien.bodies import ROBOT, WORLD, groups_apart
 from pytest_simbench.sims.sapien.readback import _compatible
 
+from pytest_simbench.laws.loops import FourBarSwing
 from pytest_simbench.laws.mechanisms import Part, Y, mechanism
 from pytest_simbench.scene import Coupling, FloatArray, Scene
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
@@ -74,6 +75,21 @@ def test_joints_of_two_links_are_not_coupled() -> None:
     robot = mechanism("chain", joints.lever("first"), second, couplings=(pair,))
     with pytest.raises(NotSupportedError, match="'first' is on 'base', 'second' on 'first link'"):
         loaded(SAPIEN, Scene("chain", robot=robot))
+
+
+@pytest.mark.parametrize("own", ["spring", "passive_damping", "friction"])
+def test_joints_with_something_beside_them_have_no_wrenches(own: str) -> None:
+    lever = Part("lever", Y, centre=(0.3, 0.0, 0.0), **{own: 2.0})
+    with (
+        world(Scene("beside", robot=mechanism("beside", lever))) as made,
+        pytest.raises(NotSupportedError, match="no wrenches"),
+    ):
+        made.joint_wrenches()
+
+
+def test_links_of_a_loop_have_no_wrenches() -> None:
+    with world(FourBarSwing().build()) as made, pytest.raises(NotSupportedError, match="wrenches"):
+        made.joint_wrenches()
 
 
 PARTS = ("ground", *(f"{kind}/{n}" for kind in ("body", "link") for n in range(4)))
