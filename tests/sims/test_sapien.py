@@ -87,6 +87,19 @@ def test_joints_with_something_beside_them_have_no_wrenches(own: str) -> None:
         made.joint_wrenches()
 
 
+def test_a_hinge_s_spring_ends_half_a_turn_away() -> None:
+    """At rest there it is refused; a slider's is not, and what passes there is declared."""
+    for slides in (True, False):
+        part = Part("sprung", Y, slides=slides, spring=2.0, rest=3.2)
+        scene = Scene("sprung", robot=mechanism("sprung", part))
+        if slides:
+            loaded(SAPIEN, scene).close()
+    told = [d.reason for d in SAPIEN.info.deviations if d.only in scene.words]
+    assert any("half a turn" in reason for reason in told)
+    with pytest.raises(NotSupportedError, match="rest at 3.2 rad"):
+        loaded(SAPIEN, scene)
+
+
 def test_links_of_a_loop_have_no_wrenches() -> None:
     with world(FourBarSwing().build()) as made, pytest.raises(NotSupportedError, match="wrenches"):
         made.joint_wrenches()
