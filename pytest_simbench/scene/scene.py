@@ -41,6 +41,7 @@ class Start(Wire):
         poses: of each, in the frame that its file gives it (`Compound.file_frame`).
         positions: of the robot's joints [rad or m]; empty: as the scene has them.
         targets: what its drives are told there; empty: the positions.
+        speeds: velocities that they are told [rad/s or m/s]; empty: none.
         efforts: what they are told in addition [N m or N]; empty: none.
     """
 
@@ -48,6 +49,7 @@ class Start(Wire):
     poses: tuple[Pose, ...]
     positions: tuple[float, ...] = ()
     targets: tuple[float, ...] = ()
+    speeds: tuple[float, ...] = ()
     efforts: tuple[float, ...] = ()
 
 

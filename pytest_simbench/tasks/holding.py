@@ -52,15 +52,16 @@ class Holding(OnJoints):
     def parameters(self) -> dict[str, Any]:
         return super().parameters() | {"task.seconds": self.seconds}
 
-    def commands(self, seed: int) -> tuple[FloatArray, FloatArray]:
-        """What the drives are told: positions, (n_joints,) [rad or m], and efforts [N m or N]."""
+    def commands(self, seed: int) -> FloatArray:
+        """What the drives are told: positions, velocities and efforts, (3, n_joints)."""
         start = self.start(seed) or Start((), ())
         targets = start.targets or start.positions or self.world.arm.column("initial_position")
-        return np.array(targets), np.array(start.efforts or np.zeros(len(self.joints)))
+        none = (0.0,) * len(targets)
+        return np.array([targets, start.speeds or none, start.efforts or none])
 
     def perform(self, world: World, seed: int, count: Count) -> Outcome:
-        before, (targets, efforts) = world.joints[0], self.commands(seed)
-        world.follow(Trajectory.holding(LOG_PERIOD, targets, efforts))
+        before, told = world.joints[0], self.commands(seed)
+        world.follow(Trajectory(LOG_PERIOD, *np.stack([told, told], axis=1)))
         seen = rest(world, self.seconds, "hold")
         gone = world.joints[0] - before
         metrics = self.by_kind("gone", np.abs(gone))
@@ -71,7 +72,7 @@ class Holding(OnJoints):
             metrics["farthest"] = max(moved.values())
         details = {
             "gone": dict(zip(self.joints, gone.tolist(), strict=True)),
-            "targets": dict(zip(self.joints, targets.tolist(), strict=True)),
+            "targets": dict(zip(self.joints, told[0].tolist(), strict=True)),
             "places": {name: pose.as_array().tolist() for name, pose in bodies.items()},
         }
         return Outcome(metrics, details)

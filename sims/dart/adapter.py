@@ -72,7 +72,8 @@ class DART(Simulator):
             Deviation("joint/*/armature", "DART has no rotor inertia"),
             Deviation(
                 "joint/*/stiffness joint/*/damping",
-                "servo motors are velocity constraints, neither springs nor dampers",
+                "servo motors are velocity constraints, neither springs nor dampers: an effort "
+                "beside one does nothing",
             ),
             Deviation("link/*/damping", "DART has no damping of links"),
             Deviation("closure/*", "DART keeps the points of a ball joint to itself", only="loop"),

@@ -50,7 +50,8 @@ class Gazebo(Simulator):
             Deviation("joint/*/armature", "Gazebo has no rotor inertia"),
             Deviation(
                 "joint/*/stiffness joint/*/damping",
-                "velocity commands are constraints of the engine, neither springs nor dampers",
+                "velocity commands are constraints of the engine, neither springs nor dampers: an "
+                "effort beside one does nothing",
             ),
             Deviation("body/*/damping link/*/damping", "Gazebo tells no damping of links"),
             Deviation(

@@ -57,10 +57,15 @@ class Drive:
         keyframe, (nu,) [rad or m]; None: it holds it nowhere."""
         return self._pull(controls) / self.stiffness - self.zero if self.stiffness else None
 
+    def speed(self, controls: FloatArray) -> float:
+        """What it is told that has damping alone: how fast the controls ask it to move its joint
+        [rad/s or m/s]."""
+        braked = self.damping and not self.stiffness
+        return self._pull(controls) / self.damping if braked else 0.0
+
     def effort(self, controls: FloatArray) -> float:
-        """What it is told beside that: of a motor its effort, of what has damping alone that with
-        which it moves as fast as the controls ask [N m or N]."""
-        return 0.0 if self.stiffness else self._pull(controls)
+        """What a motor is told [N m or N]."""
+        return 0.0 if self.stiffness or self.damping else self._pull(controls)
 
     def _pull(self, controls: FloatArray) -> float:
         """With the joint at rest at 0."""

@@ -168,11 +168,13 @@ class MuJoCo(Simulator):
         kind = mujoco.mjtState.mjSTATE_INTEGRATION
         state = np.empty(mujoco.mj_stateSize(self.model, kind))
         mujoco.mj_getState(self.model, self.data, state, kind)
-        return state
+        return np.concatenate([self.data.actuator_velocity, state])
 
     def restore(self, state: FloatArray) -> None:
-        mujoco.mj_setState(self.model, self.data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+        before, memory = np.split(state, [self.model.nu])
+        mujoco.mj_setState(self.model, self.data, memory, mujoco.mjtState.mjSTATE_INTEGRATION)
         mujoco.mj_forward(self.model, self.data)
+        self.data.actuator_velocity[:] = before  # of which `joint_wrenches` makes accelerations
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:
         return contact_forces(self.model, self.data, self.numbers())

@@ -303,13 +303,22 @@ def _link_of(links: Mapping[int, str], model: Any, body: int) -> str:
 
 
 def joint_wrenches(model: Any, data: Any, at: Numbers) -> FloatArray:
-    """Of the driven joints, on the links below about their origins, (n_joints, 6)."""
+    """Of the driven joints, on the links below about their origins, (n_joints, 6).
+
+    MuJoCo tells accelerations without what its implicit integrators damp. Actuators, of which each
+    driven joint has one, tell the velocities with which the last step began.
+    """
     applied = data.xfrc_applied.copy()  # of which MuJoCo knows here, and not of gravcomp
+    told, joints = data.qacc.copy(), list(at.joints.values())
+    if model.opt.integrator != mujoco.mjtIntegrator.mjINT_RK4:
+        dofs = model.jnt_dofadr[joints]
+        gained = data.qvel[dofs] - data.actuator_velocity[: len(dofs)]
+        data.qacc[dofs] = gained / model.opt.timestep
     lifted = (model.body_gravcomp * model.body_mass)[:, None] * model.opt.gravity
     data.xfrc_applied[:, :3] -= lifted
     mujoco.mj_rnePostConstraint(model, data)
-    data.xfrc_applied[:] = applied
-    bodies = model.jnt_bodyid[list(at.joints.values())]
+    data.xfrc_applied[:], data.qacc[:] = applied, told
+    bodies = model.jnt_bodyid[joints]
     torque, force = np.hsplit(data.cfrc_int[bodies], 2)
     centres = data.subtree_com[model.body_rootid[bodies]]  # which MuJoCo's torques are about
     return np.hstack([force, torque + np.cross(centres - data.xpos[bodies], force)])

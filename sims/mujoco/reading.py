@@ -358,10 +358,13 @@ class Reading:
             own = f"{self.links[row].told} is at {qpos[at][row]:.4g} rad or m, outside of its range"
             where = [self.name("key", key)]
             self.tell("key (range)", APPROXIMATED, f"{own}; here at {began[row]:.4g}", where)
-        held = [drive.target(model.key_ctrl[key]) for drive in self.tree.drives]
+        drives, controls = self.tree.drives, model.key_ctrl[key]
+        held = [drive.target(controls) for drive in drives]
         targets = [q if t is None else t for q, t in zip(positions, held, strict=True)]
-        efforts = [drive.effort(model.key_ctrl[key]) for drive in self.tree.drives]
-        told = (positions, targets, efforts if any(efforts) else ())
+        speeds = [drive.speed(controls) for drive in drives]
+        efforts = [drive.effort(controls) for drive in drives]
+        beside = (values if any(values) else () for values in (speeds, efforts))
+        told = (positions, targets, *beside)
         return Start(tuple(names), tuple(poses), *map(tuple, told))
 
 

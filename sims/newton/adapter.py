@@ -278,17 +278,20 @@ class Newton(Simulator):
         memory = np.empty(mujoco.mj_stateSize(model, kind))
         mujoco.mj_getState(model, data, memory, kind)
         arrays = [getattr(self._states[0], name).numpy().copy() for name in _STATE]
+        arrays.append(data.actuator_velocity.copy())
         command = self._ctrl.copy() if self._ctrl is not None else None
         return {"arrays": arrays, "command": command, "memory": memory, "steps": self._steps}
 
     def restore(self, state: dict[str, Any]) -> None:
-        for name, values in zip(_STATE, state["arrays"], strict=True):
+        *arrays, before = state["arrays"]
+        for name, values in zip(_STATE, arrays, strict=True):
             getattr(self._states[0], name).numpy()[:] = values
         if self._ctrl is not None:
             self._ctrl[:] = state["command"]
         kind = mujoco.mjtState.mjSTATE_INTEGRATION
         mujoco.mj_setState(self.solver.mj_model, self.solver.mj_data, state["memory"], kind)
         mujoco.mj_forward(self.solver.mj_model, self.solver.mj_data)
+        self.solver.mj_data.actuator_velocity[:] = before
         self._steps = state["steps"]
 
     def contact_forces(self) -> Iterator[tuple[str, str, FloatArray]]:

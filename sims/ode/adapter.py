@@ -245,6 +245,8 @@ class ODE(Simulator):
     def joint_wrenches(self) -> FloatArray:
         if self.prepared is None:
             return np.empty((0, 6))
+        if self.prepared.robot.couplings:  # whose contacts are no part of the joints
+            raise NotSupportedError("ode tells no wrenches of joints that are coupled")
         frames = {joint.name: self._links[joint.child].frame for joint in self.prepared.joints}
         names = self.prepared.robot.joint_names
         return np.array([self._axes[name].wrench(frames[name]) for name in names])

@@ -64,7 +64,8 @@ class PyBullet(Simulator):
             Deviation("joint/*/armature", "Bullet has no rotor inertia"),
             Deviation(
                 "joint/*/stiffness joint/*/damping",
-                "position motors are velocity constraints, neither springs nor dampers",
+                "position motors are velocity constraints, neither springs nor dampers: an effort "
+                "beside one does nothing",
             ),
             Deviation("joint/*/rest", "the adapter pushes springs of joints; Bullet has none"),
             Deviation(

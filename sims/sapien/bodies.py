@@ -140,7 +140,15 @@ def add_own(joint: Any, own: Joint, timestep: float) -> list[Any]:
 
     Its spring is a soft limit of no range, which pulls in proportion to the angle; a drive of
     PhysX's constraints pulls in proportion to the sine of half of it.
+
+    Raises:
+        NotSupportedError: a hinge's spring is at rest half a turn away or more. PhysX counts none.
     """
+    if own.spring and abs(own.rest) >= math.pi and not _slides(joint):
+        raise NotSupportedError(
+            f"sapien has springs of hinges within half a turn alone: {own.name!r} is at rest at "
+            f"{own.rest:g} rad"
+        )
     made = []
     if own.spring or own.passive_damping:
         made.append(_beside(joint, own.passive_damping, BOUNDLESS))

@@ -116,6 +116,18 @@ def test_a_motor_pushes_beside_a_drive(name: str) -> None:
     simulator.close()
 
 
+@pytest.mark.parametrize("name", ["pybullet", "dart"])
+def test_an_effort_beside_a_velocity_motor_does_nothing_which_is_told(name: str) -> None:
+    ends = []
+    for effort in (0.0, 20.0):
+        simulator = loaded(adapter(name), Scene("both", robot=ROBOT))
+        simulator.command(np.zeros(2), np.zeros(2), np.array([0.0, effort]))
+        ends.append(stepped(simulator, 0.1).joint_state()[0, 1])
+        simulator.close()
+    assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+    assert any("an effort beside one does nothing" in d.reason for d in simulator.info.deviations)
+
+
 SHARES = {"half": 0.5, "risen": -0.5, "held": 0.0, "whole": 1.0}
 HALF = Part("half", (0.0, 0.0, 1.0), slides=True, gravity=0.5)
 RISEN = Part("risen", (0.0, 0.0, 1.0), slides=True, on="mount", gravity=-0.5)

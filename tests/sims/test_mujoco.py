@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
@@ -15,7 +16,7 @@ from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import scenes
 from sims.mujoco.bounces import LARGEST, damping_ratio, direct, restitution_of
 
-from .worlds import Worlds, loaded
+from .worlds import Worlds, loaded, stepped
 
 
 def left(stiffness: float, damping: float) -> float:
@@ -55,6 +56,17 @@ def test_what_brakes_a_spin_is_told() -> None:
     assert braked < 0
     told = sum(torques[1:]) * MuJoCo.profiles["tuned"].timestep
     assert told == pytest.approx(braked, rel=1e-6)
+
+
+def test_a_restored_world_tells_what_its_joints_carried() -> None:
+    """While its drives brake the arm: as before, but for a step of its way."""
+    simulator = loaded(MuJoCo, scenes.arm_alone())
+    rest = simulator.joint_state()[0]
+    simulator.command(rest + 0.1, 0 * rest, 0 * rest)
+    told = stepped(simulator, 0.05).joint_wrenches()
+    simulator.restore(simulator.save())
+    np.testing.assert_allclose(simulator.joint_wrenches(), told, atol=0.02 * np.abs(told).max())
+    simulator.close()
 
 
 CODE = """

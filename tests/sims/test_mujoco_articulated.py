@@ -314,7 +314,7 @@ def test_a_motor_that_pulls_without_a_command_is_not_as_in_the_file(kitchen: Pat
     assert (line.state, "pulls 6 in the file" in line.reason) == ("approximated", True)
 
 
-def test_a_keyframe_tells_motors_and_velocity_servos_their_efforts(kitchen: Path) -> None:
+def test_a_keyframe_tells_motors_efforts_and_velocity_servos_speeds(kitchen: Path) -> None:
     text = KITCHEN.replace(
         "</actuator>",
         '<motor joint="slide" gear="-20"/><velocity joint="shoulder" kv="3" gear="2"/></actuator>'
@@ -322,7 +322,8 @@ def test_a_keyframe_tells_motors_and_velocity_servos_their_efforts(kitchen: Path
     )
     kitchen.write_text(text)
     (start,) = Reading(str(kitchen)).scene.starts
-    assert start.efforts == pytest.approx((-2.0, 3.0, 0.0))
+    assert start.efforts == pytest.approx((-2.0, 0.0, 0.0))
+    assert start.speeds == pytest.approx((0.0, 0.25, 0.0))
     assert start.targets == pytest.approx((0.0, 0.0, 0.4))
 
 
@@ -332,7 +333,7 @@ def test_a_keyframe_has_joints_and_what_their_drives_are_told(kitchen: Path) -> 
     (start,) = changed(kitchen, "</actuator>", key).scene.starts
     assert start.positions == pytest.approx((0.1, 2.0, -0.3))
     assert start.targets == pytest.approx((0.1, 2.0, 0.4))
-    assert start.efforts == ()
+    assert start.speeds == start.efforts == ()
     assert start.poses[0].position == (0.0, 0.0, 0.5)
 
 

@@ -221,6 +221,12 @@ def test_the_rotor_of_a_slider_turns_nothing(worlds: Worlds) -> None:
     np.testing.assert_allclose(fallen(worlds, armature=1e4), held, atol=0.03)
 
 
+def test_coupled_joints_have_no_wrenches(worlds: Worlds) -> None:
+    robot = mechanism("pair", LEVER, RACK, couplings=(Coupling("rack", "lever"),))
+    with pytest.raises(EngineFailed, match="no wrenches"):
+        worlds.load(Scene("pair", robot=robot)).joint_wrenches()
+
+
 def test_joints_of_no_common_link_are_refused(worlds: Worlds) -> None:
     far, pair = replace(RACK, on=None), Coupling("rack", "lever")
     robot = mechanism("far", LEVER, ON_LEVER, far, couplings=(pair,))

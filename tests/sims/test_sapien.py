@@ -17,6 +17,7 @@ from pytest_simbench.sims.sapien.adapter import SAPIEN
 from pytest_simbench.sims.sapien.bodies import ROBOT, WORLD, groups_apart
 from pytest_simbench.sims.sapien.readback import _compatible
 
+from pytest_simbench.laws.loops import FourBarSwing
 from pytest_simbench.laws.mechanisms import Part, Y, mechanism
 from pytest_simbench.scene import Coupling, FloatArray, Scene
 from pytest_simbench.simulator import NotSupportedError, PreparedRobot
@@ -94,6 +95,34 @@ def test_joints_of_two_links_are_not_coupled() -> None:
     robot = mechanism("chain", joints.lever("first"), second, couplings=(pair,))
     with pytest.raises(NotSupportedError, match="'first' is on 'base', 'second' on 'first link'"):
         loaded(SAPIEN, Scene("chain", robot=robot))
+
+
+@pytest.mark.parametrize("own", ["spring", "passive_damping", "friction"])
+def test_joints_with_something_beside_them_have_no_wrenches(own: str) -> None:
+    lever = Part("lever", Y, centre=(0.3, 0.0, 0.0), **{own: 2.0})
+    with (
+        world(Scene("beside", robot=mechanism("beside", lever))) as made,
+        pytest.raises(NotSupportedError, match="no wrenches"),
+    ):
+        made.joint_wrenches()
+
+
+def test_a_hinge_s_spring_ends_half_a_turn_away() -> None:
+    """At rest there it is refused; a slider's is not, and what passes there is declared."""
+    for slides in (True, False):
+        part = Part("sprung", Y, slides=slides, spring=2.0, rest=3.2)
+        scene = Scene("sprung", robot=mechanism("sprung", part))
+        if slides:
+            loaded(SAPIEN, scene).close()
+    told = [d.reason for d in SAPIEN.info.deviations if d.only in scene.words]
+    assert any("half a turn" in reason for reason in told)
+    with pytest.raises(NotSupportedError, match="rest at 3.2 rad"):
+        loaded(SAPIEN, scene)
+
+
+def test_links_of_a_loop_have_no_wrenches() -> None:
+    with world(FourBarSwing().build()) as made, pytest.raises(NotSupportedError, match="wrenches"):
+        made.joint_wrenches()
 
 
 PARTS = ("ground", *(f"{kind}/{n}" for kind in ("body", "link") for n in range(4)))
