@@ -124,6 +124,12 @@ def ends(
     return first, second
 
 
+def opening(prepared: PreparedRobot, positions: FloatArray) -> float:
+    """How far both points of a closure are apart at most, with the joints there [m]."""
+    pairs = (ends(prepared, closure, positions) for closure in reduced(prepared))
+    return max((float(np.linalg.norm(first - second)) for first, second in pairs), default=0.0)
+
+
 def frames(prepared: PreparedRobot, closure: Closure) -> tuple[Pose, Pose]:
     """A frame in each link of a reduced closure, at its points: they are one frame of the world
     where the joints start, and stay one where the closure is rigid."""

@@ -17,6 +17,8 @@ from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.resources import ResourceSampler
 from pytest_simbench.client.stopwatch import Stopwatch
 from pytest_simbench.client.world import TRACE_PERIOD, World
+from pytest_simbench.description.links import opening
+from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.experiment.camera import Camera
 from pytest_simbench.experiment.ending import checked, failure, status
 from pytest_simbench.experiment.experiment import Experiment
@@ -35,6 +37,9 @@ from pytest_simbench.tasks.base import Outcome
 from pytest_simbench.tasks.own import own
 from pytest_simbench.worker.stepping import CHECK_PERIOD
 from pytest_simbench.worker.wire import named
+
+OPEN = 1e-3
+"""By how much a loop of links is open that is told [m]."""
 
 __tracebackhide__ = True  # a mistake in a task is told at its own line
 
@@ -116,6 +121,7 @@ class Repetition:
         self._constructed = Constructed()
         self._stats: dict[str, Any] = {}
         self._closing: str | None = None
+        self._opened = 0.0
 
     def kill(self) -> None:
         """End the worker at once; `run` then returns the record of an interrupted repetition."""
@@ -195,6 +201,9 @@ class Repetition:
             raise TypeError(f"perform() returns an Outcome, not {type(outcome).__name__}")
         self._stats = world.stats()
         world.read_again()
+        robot = world.scene.robot
+        if robot is not None and robot.closures:
+            self._opened = opening(PreparedRobot(robot), world.joints[0])
         return outcome
 
     def _leave(self, world: World, phase: str) -> None:
@@ -296,6 +305,7 @@ class Repetition:
             reading=outcome.reading,
             wait=outcome.wait,
             sole=self.experiment.sole,
+            opened=self._opened if self._opened > OPEN else 0.0,
         )
         return record_of(
             self.experiment,

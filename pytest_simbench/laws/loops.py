@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from pytest_simbench.description.links import ends, reduced
+from pytest_simbench.description.links import opening
 from pytest_simbench.laws.base import Reading, Watched, rounding, solved
 from pytest_simbench.laws.joints import JointMotion, Passive
 from pytest_simbench.laws.mechanisms import MOUNT, Part, Y, mechanism
@@ -113,10 +113,8 @@ class FourBarClosure(_FourBar, quantity="largest opening of the loop", unit="mm"
 
     def read(self, seen: Watched) -> Reading:
         prepared = PreparedRobot(self.mechanism)
-        (hinge,) = reduced(prepared)
         some = seen.joints[:: max(1, seen.steps // LOOKS), 0]
-        pairs = (ends(prepared, hinge, q) for q in some)
-        worst = max(float(np.linalg.norm(first - second)) for first, second in pairs)
+        worst = max(opening(prepared, q) for q in some)
         _, v, _ = self.exact(self.seconds)
         fastest = CRANK * float(np.abs(v[:, 0]).max())
         return Reading(1000 * worst, 0.0, 1000 * (fastest * seen.dt + rounding(1.0, 1)))

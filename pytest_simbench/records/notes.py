@@ -47,6 +47,8 @@ class Notes:
         wait: for the count.
         sole: whether others would be the same: the task draws nothing, and the simulator claims to
             be deterministic.
+        opened: by how much loops of the robot were open at the end, at most, where that is more
+            than 1 mm [m].
         lost_nodes: machines of a cluster that were lost with it before, and how.
     """
 
@@ -65,4 +67,5 @@ class Notes:
     reading: Reading | None = None
     wait: Wait | None = None
     sole: bool = False
+    opened: float = 0.0
     lost_nodes: tuple[str, ...] = ()

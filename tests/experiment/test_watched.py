@@ -16,8 +16,10 @@ from pytest_simbench.client import resources
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
+from pytest_simbench.laws.loops import FourBarSwing
 from pytest_simbench.records.record import Record
 from pytest_simbench.scene import Scene
+from pytest_simbench.tasks.base import Task
 from tests.tiny import Falling
 
 READING = 0.5
@@ -55,7 +57,15 @@ class Helped(MuJoCo):
         self.helper.stdout.read(1)
 
 
-def run(case: Case, adapter: str, task: Falling) -> Record:
+class Loose(MuJoCo):
+    """What holds loops is a hundred times as slow as it was."""
+
+    def load(self, scene: Scene) -> None:
+        super().load(scene)
+        self.model.eq_solref[:, 0] *= 100
+
+
+def run(case: Case, adapter: str, task: Task) -> Record:
     record, error = Repetition(Experiment(replace(case, adapter=adapter), task), 1).run()
     assert error is None
     return record
@@ -81,6 +91,12 @@ def test_the_cpu_of_an_engine_s_helper_counts_as_the_sampler_has_it(
     assert 1.0 <= stepping["cpu"] / stepping["simulated"] < 2.0
     sampled = record.resources["phases"]["fall"]["cpu_percent"]["mean"] / 100 * stepping["wall"]
     assert stepping["cpu"] == pytest.approx(sampled, rel=0.4)
+
+
+@pytest.mark.parametrize(("adapter", "opened"), [("MuJoCo", False), ("Loose", True)])
+def test_a_loop_that_is_open_at_the_end_is_noted(case: Case, adapter: str, opened: bool) -> None:
+    record = run(case, f"tests.experiment.test_watched:{adapter}", FourBarSwing())
+    assert (record.notes.opened > 1e-3) == opened
 
 
 def test_pytest_tells_who_cheats(pytester: pytest.Pytester) -> None:

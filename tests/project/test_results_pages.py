@@ -244,7 +244,7 @@ def test_what_differs_for_certain_from_the_study_is_bold(data: Path, tmp_path: P
 
     assert rows[2:] == [
         "| MuJoCo `tuned` | 20, 20 | **100 → 60** |",
-        "| SAPIEN `tuned` | 20, 20 | 100 |",  # 99.7 %: one cube of 300
+        "| SAPIEN `tuned` | 20, 20 | 100 → 99.7 |",  # one cube of 300 is not for certain
     ]
 
 

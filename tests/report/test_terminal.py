@@ -96,6 +96,11 @@ def test_warnings_take_what_is_left_and_say_how_many_more(width: int) -> None:
     assert re.fullmatch(r"\d+ more warnings with -v and in the report", lines[-1])
 
 
+def test_a_loop_that_stood_open_is_told() -> None:
+    report = render_brief(summarise(run_of_eight(notes=Notes(opened=0.0123)), METRICS), 100)
+    assert "note: all: loops of links stood open at the end, by up to 12 mm" in report
+
+
 def test_notes_of_one_text_stand_together_and_say_what_is_not_described() -> None:
     report = render_brief(summarise(run_of_eight(contended=True), METRICS), 100)
     assert report.count("note:") == 1

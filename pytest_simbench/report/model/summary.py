@@ -245,6 +245,8 @@ def _row(records: Sequence[Record], metrics: Sequence[Metric], test: str) -> Row
     without = {m.name: results.without(m) for m in metrics}
     if lacking := [f"{k} {n} of {len(done)}" for k, n in without.items() if 0 < n < len(done)]:
         notes.append(f"finished repetitions without a value: {', '.join(lacking)}")
+    if (opened := max((r.notes.opened for r in done), default=0.0)) > 0:
+        notes.append(f"loops of links stood open at the end, by up to {1000 * opened:.2g} mm")
     if any(record.contended for record in done):
         notes.append("repetitions ran in parallel: its times and CPU are contended")
     if any(record.notes.filmed for record in done):
