@@ -83,11 +83,13 @@ def compare_by_seed(
     alternative: Alternative = "two-sided",
     *,
     sole: bool = False,
+    permutations: int = 0,
 ) -> MeanDifference:
     """Test whether `second` differs from `first`, paired where nearly all seeds are on both sides.
 
     Args:
         sole: more repetitions would be the same: the means differ, or they do not.
+        permutations: see `compare`.
 
     Raises:
         ValueError: an empty side.
@@ -95,7 +97,7 @@ def compare_by_seed(
     shared = len(first.keys() & second.keys())
     paired = shared >= max(2, math.ceil(COMMON_SEEDS * min(len(first), len(second))))
     sides = pair(first, second) if paired else ([*first.values()], [*second.values()])
-    found = compare(*sides, paired=paired, alternative=alternative)
+    found = compare(*sides, paired=paired, alternative=alternative, permutations=permutations)
     if not sole:
         return found
     apart = not math.isclose(found.first, found.second, rel_tol=1e-12)
@@ -109,6 +111,7 @@ def compare(
     *,
     paired: bool = False,
     alternative: Alternative = "two-sided",
+    permutations: int = 0,
 ) -> MeanDifference:
     """Test whether `second` differs from `first` (is `less`, is `greater`).
 
@@ -116,6 +119,7 @@ def compare(
         first, second: values (n,) and (m,); pairs in order where paired.
         paired: whether they share their seeds.
         alternative: the direction of the difference second - first.
+        permutations: that are drawn where there are more, at most; 0: `PERMUTATIONS`.
 
     Raises:
         ValueError: an empty side, or pairs of different numbers.
@@ -125,11 +129,13 @@ def compare(
         raise ValueError("nothing to compare: a side has no repetitions")
     if paired and a.size != b.size:
         raise ValueError(f"pairs need as many values on each side, not {a.size} and {b.size}")
-    p = _permutation(a, b, paired, alternative)
+    p = _permutation(a, b, paired, alternative, permutations or PERMUTATIONS)
     return MeanDifference(float(a.mean()), float(b.mean()), p, paired, (a.size, b.size))
 
 
-def _permutation(a: FloatArray, b: FloatArray, paired: bool, alternative: Alternative) -> float:
+def _permutation(
+    a: FloatArray, b: FloatArray, paired: bool, alternative: Alternative, permutations: int
+) -> float:
     from scipy import stats
 
     if min(a.size, b.size) < 2:
@@ -137,7 +143,7 @@ def _permutation(a: FloatArray, b: FloatArray, paired: bool, alternative: Altern
     scale = max(float(np.abs(a).max()), float(np.abs(b).max())) or 1.0
     if min(a.size, b.size) > MANY:
         if paired:
-            return _signs(b - a, scale, alternative)
+            return _signs(b - a, scale, alternative, permutations)
         both = np.concatenate([a, b]) - np.concatenate([a, b]).mean()
         variance = float((both**2).sum()) / (both.size - 1) * (1 / a.size + 1 / b.size)
         if _carrying(both) >= EFFECTIVE:
@@ -152,7 +158,7 @@ def _permutation(a: FloatArray, b: FloatArray, paired: bool, alternative: Altern
         mean_difference,
         permutation_type="samples" if paired else "independent",
         vectorized=True,
-        n_resamples=PERMUTATIONS,
+        n_resamples=permutations,
         alternative=alternative,
         rng=np.random.default_rng(SEED),
         batch=max(1, 10**8 // (a.size + b.size)),
@@ -160,7 +166,9 @@ def _permutation(a: FloatArray, b: FloatArray, paired: bool, alternative: Altern
     return float(found.pvalue)
 
 
-def _signs(differences: FloatArray, scale: float, alternative: Alternative) -> float:
+def _signs(
+    differences: FloatArray, scale: float, alternative: Alternative, permutations: int
+) -> float:
     """The same of many pairs: each permutation changes the signs of some differences."""
     parts = differences[np.abs(differences) > 1e-12 * scale]  # equal pairs change none
     if parts.size < 2:
@@ -168,13 +176,13 @@ def _signs(differences: FloatArray, scale: float, alternative: Alternative) -> f
     if _carrying(parts) >= EFFECTIVE:
         return _normal(float(parts.sum()), float((parts**2).sum()), alternative)
     rng, parts = np.random.default_rng(SEED), parts / scale / parts.size
-    bits = rng.integers(0, 256, (PERMUTATIONS, -(-parts.size // 8)), dtype=np.uint8)
+    bits = rng.integers(0, 256, (permutations, -(-parts.size // 8)), dtype=np.uint8)
     flips = np.unpackbits(bits, axis=1, count=parts.size)
     sums = np.concatenate([part.astype(float) @ parts for part in np.array_split(flips, 20)])
     drawn, observed = np.round(parts.sum() - 2 * sums, 12), np.round(parts.sum(), 12)
     less, greater = (
-        (1 + int((drawn <= observed).sum())) / (1 + PERMUTATIONS),
-        (1 + int((drawn >= observed).sum())) / (1 + PERMUTATIONS),
+        (1 + int((drawn <= observed).sum())) / (1 + permutations),
+        (1 + int((drawn >= observed).sum())) / (1 + permutations),
     )
     found = {"less": less, "greater": greater, "two-sided": 2 * min(less, greater)}
     return min(1.0, found[alternative])

@@ -178,8 +178,13 @@ def run_gate(
     share = 1 / (1 + beside)
     crashes_may = next((limit for limit in limits if limit.metric == CRASHED.name), NO_MORE)
     limits = [limit for limit in limits if limit.metric != CRASHED.name]
+    # So many are drawn that each can be significant, though some of them are the observed one.
+    finest = max(PERMUTATIONS, math.ceil(5 * len(limits) * len(common) / (ALPHA * share)))
     found = {
-        limit: {test: _change(test, before[test], after[test], limit) for test in common}
+        limit: {
+            test: _change(test, before[test], after[test], limit, permutations=finest)
+            for test in common
+        }
         for limit in limits
     }
     tested = [change for of_limit in found.values() for change in of_limit.values()]
@@ -206,7 +211,7 @@ def run_gate(
         f"{change.test}: {change.repetitions} are too few for a change of {change.metric.name} "
         f"to be significant among {number} comparisons"
         for change in changes
-        if _smallest_p(change.comparison) * number > ALPHA * share
+        if _smallest_p(change.comparison, finest) * number > ALPHA * share
     ]
     notes += few
     for limit, of_limit in found.items():
@@ -218,7 +223,7 @@ def run_gate(
             for test, (why, gone) in apart.items():
                 fails = typed and gone and after[test].ok
                 (broken if fails else notes).append(f"{test}: {limit} is not tested: {why}")
-    if typed and few and len(few) == len(changes):
+    if typed and few and len(few) == len(changes) and crashes_may is NO_MORE:
         broken.append("no limit can fail with so few repetitions; raise --reps in both runs")
     number = max(1, sum(change.by_chance for change in others))
     seen = [change for change in others if change.visible]
@@ -342,7 +347,13 @@ GONE = Untested("no repetition of this run has a value", lost=True)
 
 
 def _change(
-    test: str, old: ResultSet, new: ResultSet, limit: Limit, *, both_ways: bool = False
+    test: str,
+    old: ResultSet,
+    new: ResultSet,
+    limit: Limit,
+    *,
+    both_ways: bool = False,
+    permutations: int = 0,
 ) -> Change | Untested:
     """The change of one metric, not yet corrected; else why there is none."""
     if not (limit.metric in old.known and limit.metric in new.known):
@@ -359,7 +370,7 @@ def _change(
         return Untested("no repetition of the baseline has a value")
     if not new.values(metric):
         return GONE
-    comparison, evened = compared(metric, old, new, both_ways=both_ways)
+    comparison, evened = compared(metric, old, new, both_ways=both_ways, permutations=permutations)
     had, ended = len(old.values(metric)), len(new.ok)
     have = sum(new.value(record, metric) is not None for record in new.ok)
     if have < ended and min(had, ended) >= PAIRS and _smallest_p(comparison) > ALPHA:
@@ -379,12 +390,13 @@ def _of_machines(old: ResultSet, new: ResultSet, name: str) -> bool:
     return first != second and without_speed(name, old, new) is None
 
 
-def _smallest_p(comparison: MeanDifference) -> float:
-    """The smallest p value that so many repetitions can give in a permutation test."""
+def _smallest_p(comparison: MeanDifference, permutations: int = 0) -> float:
+    """The smallest p value that so many repetitions can give in a permutation test that draws so
+    many permutations; 0: `PERMUTATIONS`."""
     if comparison.sole:
         return 0.0
     first, second = comparison.n
     if min(first, second) < 2:
         return 1.0
     arrangements = 2**first if comparison.paired else math.comb(first + second, first)
-    return 1 / min(arrangements, PERMUTATIONS + 1)
+    return 1 / min(arrangements, (permutations or PERMUTATIONS) + 1)

@@ -41,10 +41,15 @@ def without_speed(name: str, before: ResultSet, after: ResultSet) -> tuple[Value
 
 
 def compared(
-    metric: Metric, before: ResultSet, after: ResultSet, *, both_ways: bool = False
+    metric: Metric,
+    before: ResultSet,
+    after: ResultSet,
+    *,
+    both_ways: bool = False,
+    permutations: int = 0,
 ) -> tuple[MeanDifference, bool]:
     """Whether a metric is worse in the second run than in the first (`both_ways`: another one), by
-    seed; and whether the machine's speed was taken out.
+    seed; and whether the machine's speed was taken out. `permutations`: see `comparison.compare`.
 
     Raises:
         ValueError: a side has no value.
@@ -55,6 +60,7 @@ def compared(
         *(even or (before.by_seed(metric), after.by_seed(metric))),
         "two-sided" if both_ways else worse,
         sole=before.sole(metric) and after.sole(metric),
+        permutations=permutations,
     )
     return found, even is not None
 

@@ -17,7 +17,7 @@ from pytest_simbench.plugin import options
 from pytest_simbench.records.baseline import FORMS, BaselineError, from_benchmarks, read_baseline
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.metrics import Metric, UnknownMetric
-from pytest_simbench.records.series import side_by_side
+from pytest_simbench.records.series import short, side_by_side
 from pytest_simbench.report.markdown.run import render_section
 from pytest_simbench.report.model import changes
 from pytest_simbench.report.model.outcome import Compared
@@ -53,8 +53,8 @@ class Comparison:
             before, now = side_by_side(run.records, *self.beside)
             baseline, run = replace(baseline, records=before), replace(run, records=now)
         found = gate_runs(baseline, run, self.limits, typed=self.typed)
-        gone = {*skipped} - {r.test for r in run.records}
-        had = {r.name: None for r in baseline.records if r.ok and r.test in gone}
+        gone = {*map(short, skipped)} - {short(r.test) for r in run.records}
+        had = {r.name: None for r in baseline.records if r.ok and short(r.test) in gone}
         lost = [f"{name} is in the baseline, and was skipped" for name in had]
         if self.typed and lost:
             found = replace(found, broken=(*found.broken, *lost))

@@ -97,32 +97,33 @@ def combined(scene: Scene, rule: str, links: Sequence[str] = ()) -> tuple[Scene,
 def _ranks(
     scene: Scene, pairs: Sequence[tuple[int, int]], still: Sequence[bool]
 ) -> NDArray[np.int_]:
-    """Of pairs of places among ground, bodies and robot: 1 of what touches at the start; 2 of what
-    is near, of a robot with what can move, of what touches nothing with what stands still; 3 of
-    others."""
-    robot = len(scene.bodies) + 1
-    touching = {pair for pair in pairs if robot not in pair and _touch(scene, *pair)}
+    """Of pairs of places among ground, bodies and robot: 1 of what touches where the scene is
+    written; 2 of what is near, of a robot with what can move, of what touches nothing with what
+    stands still; 3 of others."""
+    poses = scene.written or [body.pose for body in scene.bodies]
+    bodies = [body.moved_to(at) for body, at in zip(scene.bodies, poses, strict=True)]
+    parts = [[part.moved_to(body.pose * part.pose) for part in body.parts] for body in bodies]
+    lowest = [float(body.reach_placed(np.array([[0.0, 0.0, -1.0]]))[0]) for body in bodies]
+    robot = len(bodies) + 1
+
+    def near(a: int, b: int) -> bool:
+        return a > 0 and b < robot and _near(bodies[a - 1], bodies[b - 1])
+
+    def touch(a: int, b: int) -> bool:
+        if a == 0:
+            return b < robot and lowest[b - 1] >= -TOUCHING
+        sides = product(parts[a - 1], parts[b - 1]) if near(a, b) else ()
+        return any(_near(one, two) and penetration(one, two) >= -TOUCHING for one, two in sides)
+
+    touching = {pair for pair in pairs if touch(*pair)}
     resting = {robot, *(place for pair in touching for place in pair)}
     ranks = []
     for a, b in pairs:
         held = b == robot != a and not still[a]
         falls = (still[a] and b not in resting) or (still[b] and a not in resting)
-        near = a > 0 and b < robot and _near(scene.bodies[a - 1], scene.bodies[b - 1])
-        ranks.append(1 if (a, b) in touching else 2 if held or falls or near else 3)
+        second = held or falls or near(a, b)
+        ranks.append(1 if (a, b) in touching else 2 if second else 3)
     return np.array(ranks)
-
-
-def _touch(scene: Scene, first: int, second: int) -> bool:
-    """Whether two bodies touch; 0 is the ground, others are counted from 1."""
-    body, other = scene.bodies[second - 1], scene.bodies[first - 1]
-    if first == 0:
-        return float(body.reach_placed(np.array([[0.0, 0.0, -1.0]]))[0]) >= -TOUCHING
-    if not _near(body, other):
-        return False
-    sides = [
-        [part.moved_to(whole.pose * part.pose) for part in whole.parts] for whole in (body, other)
-    ]
-    return any(_near(a, b) and penetration(a, b) >= -TOUCHING for a, b in product(*sides))
 
 
 def _near(a: Body, b: Body) -> bool:

@@ -80,6 +80,8 @@ class Scene(Wire):
         friction_rule: what the friction of two surfaces is, one of `friction.RULES`.
         apart: pairs that do not collide, each two of "ground", `body/NAME` and `link/NAME`; links
             are those of the reduced robot. Only for engines with the capability `apart`.
+        written: poses of the bodies before a task moved them: what touches there counts for their
+            frictions, in each repetition alike; empty: as they stand.
         file: that it was read from, an absolute path; empty: none.
         file_timestep: time step that the file asks for [s]; 0: none.
         file_lift: height by which all stands higher here than in the file [m].
@@ -94,6 +96,7 @@ class Scene(Wire):
         "ground_restitution",
         "friction_rule",
         "apart",
+        "written",
         "file",
         "file_timestep",
         "file_lift",
@@ -109,6 +112,7 @@ class Scene(Wire):
     friction_rule: str = "maximum"
     apart: tuple[tuple[str, str], ...] = ()
     starts: tuple[Start, ...] = ()
+    written: tuple[Pose, ...] = ()
     file: str = ""
     file_timestep: float = 0.0
     file_lift: float = 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -53,8 +53,10 @@ class OnScene(Task):
         return self.starts[seed % len(self.starts)] if self.starts else None
 
     def scene(self, seed: int, jitter: Jitter) -> Scene:
-        start = self.start(seed)
-        return self.world if start is None else self.world.at_start(start)
+        start, world = self.start(seed), self.world
+        if len(world.frictions) > 1:
+            world = replace(world, written=tuple(body.pose for body in world.bodies))
+        return world if start is None else world.at_start(start)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,9 @@ def own(task: Task) -> Task:
     acting = {k: one for k, one in held.items() if callable(one) or hasattr(one, "act")}
     if not acting:
         return task
-    mine, known = copy(task), Known()
+    mine = copy(task)
+    known = {id(value): value for name, value in held.items() if name not in acting}
+    known[id(task)] = mine  # what the task shares with a policy it goes on sharing
     vars(mine).update({name: _copied(policy, known) for name, policy in acting.items()})
     return mine
 

@@ -352,6 +352,15 @@ def test_how_few_are_too_few() -> None:
     assert notes(6, 6, two) == ()
 
 
+def test_many_comparisons_can_fail_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As many permutations are drawn as the correction for their number takes."""
+    monkeypatch.setattr(gate, "PERMUTATIONS", 99)
+    before = [r for k in range(8) for r in made([1.0] * 9, test=f"test_{k}[e]")]
+    after = [r for k in range(8) for r in made([1.0 - (k == 3)] * 9, test=f"test_{k}[e]")]
+    (failure,) = run(before, after, "placed:5%").failures
+    assert failure.startswith("test_3[e]: placed fell from 100 % to 0 %")
+
+
 def test_a_test_that_is_broken_is_told_beside_its_limits() -> None:
     """Only where the baseline had results, and the run has failures."""
     nothing = [failed(k) for k in range(5)]

@@ -187,6 +187,9 @@ def test_a_test_that_is_skipped_now_fails_a_typed_limit(
     told = "FAILED test_falling[[]mujoco-headless[]] is in the baseline, and was skipped"
     result.stdout.fnmatch_lines([told])
     run_pytest(pytester, f"{ARGUMENTS} --sim-baseline=base", ret=0)
+    (moved,) = pytester.path.glob("test_*.py")  # its baseline was made elsewhere
+    (pytester.mkdir("sub") / moved.name).write_text(moved.read_text())
+    run_pytest(pytester, f"{words} sub", ret=1).stdout.fnmatch_lines([told])
 
 
 def test_junit_has_a_property_for_each_metric(

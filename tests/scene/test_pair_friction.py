@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from pytest_simbench.scene import Box, Pose, Scene, SceneError
 from pytest_simbench.scene.friction import RULES
 from pytest_simbench.scene.pair_friction import OF_PAIRS, combined
+from pytest_simbench.tasks import Settling
+from pytest_simbench.tasks.base import Jitter
 from pytest_simbench.testing import scenes
 from tests.approval import assert_approved_message
 from tests.scene.test_bodies import SHAPES, thing
@@ -132,6 +134,21 @@ def test_bodies_on_the_ground_have_their_frictions_there(rule: str, data: st.Dat
     count = len(frictions)
     assert of_pairs(made)[:count] == pytest.approx(of_pairs(own)[:count], rel=1e-3)
     assert "ground" not in problem
+
+
+def test_a_start_that_is_moved_has_the_same_frictions() -> None:
+    """Boxes 0.8 mm apart, which touch or not as they are moved by less: frictions were chosen
+    anew for each repetition, and a moved start was another scene."""
+    row = tuple(
+        Box(f"box{k}", (0.1,) * 3, Pose.at(0.1008 * k, 0, 0.05), 1.0, mu)
+        for k, mu in enumerate((0.2, 0.5, 0.9))
+    )
+    task = Settling(Scene("s", row, ground_friction=0.4), moved=3.9e-4)
+    made = [combined(task.scene(seed, Jitter()), "minimum")[0] for seed in range(10)]
+    assert (
+        len({(scene.ground_friction, *(b.friction for b in scene.bodies)) for scene in made}) == 1
+    )
+    assert len({scene.bodies[0].pose for scene in made}) == 10
 
 
 def test_the_worst_pair_that_touches_is_told_first() -> None:

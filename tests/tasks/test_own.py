@@ -75,3 +75,21 @@ def test_networks_and_what_cannot_be_copied_are_shared() -> None:
         assert own(Reaching(policy)).policy(0) is network
     assert own(Reaching(Object(network=network))).policy.network is network
     assert own(Reaching(network)).policy is network
+
+
+class Own(Reaching):
+    def act(self, seen: Any) -> int:
+        return acting(vars(self)["rows"], seen)
+
+
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_what_a_task_shares_with_its_policy_it_goes_on_sharing(which: int) -> None:
+    """A task that counts what its policy did counted nothing."""
+    rows: list[int] = []
+    task, policy = Own(closure()), Object()
+    policy.rows = rows  # type: ignore[attr-defined]
+    vars(task).update(rows=rows, policy=(task.act, lambda seen: acting(rows, seen), policy)[which])
+    mine = own(task)
+    assert isinstance(mine, Own)
+    as_policy(mine.policy).act(1)
+    assert vars(mine)["rows"] == [1]
