@@ -329,8 +329,8 @@ _ROWS: dict[str, tuple[Any, ...]] = {
     "driven_body": ("the belt is a free body", "body/belt/dynamic",
                     of_body("belt", prescribed=False, mass=0.4)),
     "gravity": ("gravity is 1 % stronger", "gravity", of_scene(gravity=(0.303, -0.202, -3.737))),
-    "ground_friction": ("the ground's friction is 0.5", "ground/friction",
-                        of_scene(ground_friction=0.5)),
+    "ground_friction": ("the ground's friction is 0.9", "ground/friction",
+                        of_scene(ground_friction=0.9)),
 }  # fmt: skip
 
 FAULTS: dict[str, Fault] = {

@@ -231,7 +231,7 @@ TEST = """
     from tests.tiny import Falling
 
     def test_falling(repeat, threshold):
-        repeat(Falling(duration=0.2)).assert_at_most("landed", threshold("landed", 1.0))
+        repeat(Falling(duration=0.2)).assert_at_most("landed", threshold("landed", 0.9))
 """
 
 

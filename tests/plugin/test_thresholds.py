@@ -14,7 +14,7 @@ TEST = """
 
     @pytest.mark.parametrize("name", ["landed"])
     def test_falling(repeat, threshold, name):
-        repeat(Falling(duration=0.2)).assert_at_least(name, threshold(name, 0.0))
+        repeat(Falling(duration=0.2)).assert_at_least(name, threshold(name, 0.1))
 
     def test_other(threshold):
         assert threshold("own_metric", 1.0) == 2.0

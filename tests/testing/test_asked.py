@@ -65,7 +65,7 @@ class Asked(MadeUp):
     def __init__(self, scene: Scene, told: Told) -> None:
         super().__init__(scene)
         self.told = told
-        digest = OnScene.parameters(Mock(world=scene))["task.scene_digest"]
+        digest = OnScene.parameters(Mock(world=scene, starts=()))["task.scene_digest"]
         told.lines.append(f"{scene.name} {digest[:6]}")
 
     def wait(self, duration: float, *, log_period: float | None = None) -> Motion:
