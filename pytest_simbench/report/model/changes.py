@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pytest_simbench.measure.gate import Change, GateReport
+from pytest_simbench.measure.change import Change
+from pytest_simbench.measure.gate import GateReport
 from pytest_simbench.records.metrics import CRASHED
 from pytest_simbench.records.series import short
 from pytest_simbench.report.model.document import Column, Section, Table
