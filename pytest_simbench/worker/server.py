@@ -85,6 +85,7 @@ class Server:
         self.simulator: Simulator | None = None
         self.stepper: Stepper | None = None
         self.scene = Scene("empty")
+        self.robot: PreparedRobot | None = None
         self.compared: tuple[dict[str, Any], dict[str, Any]] | None = None
         self.saved: dict[str, Any] = {}
         self.number, self.pid = 0, os.getpid()
@@ -170,8 +171,9 @@ class Server:
         check_start(simulator, world)
         self.compared = None
         if parity:
+            self.robot = None if world.robot is None else PreparedRobot(world.robot)
             expected, reported = (
-                expected_quantities(world, simulator.settings),
+                expected_quantities(world, simulator.settings, self.robot),
                 checked_quantities(simulator),
             )
             info = simulator.info
@@ -190,7 +192,8 @@ class Server:
     def do_watch(self, seed: int) -> None:
         """From now on, look whether the world stays as it was loaded; see `Watch`."""
         if self.compared is not None:
-            self._loaded().watch = Watch(self._constructed(), self.scene, *self.compared, seed)
+            simulator, scene = self._constructed(), self.scene
+            self._loaded().watch = Watch(simulator, scene, *self.compared, seed, self.robot)
 
     def do_read_again(self) -> None:
         """Whether the engine still holds what it held when the world was loaded, if watched."""

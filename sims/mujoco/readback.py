@@ -72,6 +72,9 @@ class ReadBack(readback.ReadBack):
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
         mujoco.mj_comVel(model, self.data)
+        types, affinities = model.geom_contype, model.geom_conaffinity
+        self._kinds = types[:, None] & affinities | affinities[:, None] & types
+        self._owners, self._excluded = model.geom_bodyid.tolist(), {*model.exclude_signature.tolist()}
         scene = simulator.scene
         super().__init__(
             simulator,
@@ -229,14 +232,12 @@ class ReadBack(readback.ReadBack):
         return bool(model.body_dofnum[body] == 6 and body not in ends)
 
     def collide(self, first: Part, second: Part) -> Any:
-        model, a, b = self.model, first.geoms, second.geoms
+        a, b = first.geoms, second.geoms
         if not (a and b):
             return ()
-        low, high = sorted(int(model.geom_bodyid[geoms[0]]) for geoms in (a, b))
-        types, affinities = model.geom_contype, model.geom_conaffinity
-        kinds = types[a, None] & affinities[b] | affinities[a, None] & types[b]
-        excluded = (low << 16) + high in model.exclude_signature
-        return kinds * (not excluded and not self.off & {"CONTACT", "CONSTRAINT"})
+        low, high = sorted((self._owners[a[0]], self._owners[b[0]]))
+        excluded = (low << 16) + high in self._excluded
+        return self._kinds[a][:, b] * (not excluded and not self.off & {"CONTACT", "CONSTRAINT"})
 
     def joint(self, name: str) -> dict[str, Any]:
         model, joint = self.model, self.at.joints[name]
