@@ -74,7 +74,8 @@ class ReadBack(readback.ReadBack):
         mujoco.mj_comVel(model, self.data)
         types, affinities = model.geom_contype, model.geom_conaffinity
         self._kinds = types[:, None] & affinities | affinities[:, None] & types
-        self._owners, self._excluded = model.geom_bodyid.tolist(), {*model.exclude_signature.tolist()}
+        self._owners = model.geom_bodyid.tolist()
+        self._excluded = {*model.exclude_signature.tolist()}
         scene = simulator.scene
         super().__init__(
             simulator,
