@@ -72,10 +72,14 @@ class ReadBack(readback.ReadBack):
         mujoco.mj_kinematics(model, self.data)
         mujoco.mj_comPos(model, self.data)
         mujoco.mj_comVel(model, self.data)
-        types, affinities = model.geom_contype, model.geom_conaffinity
-        self._kinds = types[:, None] & affinities | affinities[:, None] & types
-        self._owners = model.geom_bodyid.tolist()
-        self._excluded = {*model.exclude_signature.tolist()}
+        types, affinities, owners = model.geom_contype, model.geom_conaffinity, model.geom_bodyid
+        ends = np.minimum.outer(owners, owners), np.maximum.outer(owners, owners)
+        excluded = np.isin((ends[0] << 16) + ends[1], model.exclude_signature)
+        masks = types[:, None] & affinities | affinities[:, None] & types
+        self._collide = (masks != 0) & ~excluded
+        pairs = [model.pair_geom1, model.pair_geom2]  # collide whatever their masks
+        self._collide[*pairs] = self._collide[*pairs[::-1]] = True
+        self._collide &= not self.off & {"CONTACT", "CONSTRAINT"}
         scene = simulator.scene
         super().__init__(
             simulator,
@@ -233,12 +237,7 @@ class ReadBack(readback.ReadBack):
         return bool(model.body_dofnum[body] == 6 and body not in ends)
 
     def collide(self, first: Part, second: Part) -> Any:
-        a, b = first.geoms, second.geoms
-        if not (a and b):
-            return ()
-        low, high = sorted((self._owners[a[0]], self._owners[b[0]]))
-        excluded = (low << 16) + high in self._excluded
-        return self._kinds[a][:, b] * (not excluded and not self.off & {"CONTACT", "CONSTRAINT"})
+        return self._collide[first.geoms][:, second.geoms]
 
     def joint(self, name: str) -> dict[str, Any]:
         model, joint = self.model, self.at.joints[name]
