@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from pytest_simbench.measure import change_points as module
 from pytest_simbench.measure.change_points import PERMUTATIONS, _chance, _shifts, change_points
 
 Row = list[dict[int, float]]
@@ -76,7 +77,11 @@ def test_what_never_varies_has_none_and_what_is_missing_is_left_out() -> None:
     assert places(found) == [4]
 
 
-def test_a_chance_is_a_share_of_all_orders_with_the_one_seen() -> None:
+@pytest.mark.parametrize("at_once", [10**6, 840])
+def test_a_chance_is_a_share_of_all_orders_with_the_one_seen(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "AT_ONCE", at_once)
     part = np.arange(12.0).reshape(-1, 1)
     always, never = _chance(part, -np.inf), _chance(part, np.inf)
     assert (always, never) == (1.0, 1 / (PERMUTATIONS + 1))

@@ -219,6 +219,17 @@ def test_a_difference_below_the_resolution_is_none(metric: Metric, gap: float, w
     assert bool(wins(sides, [metric])) is won
 
 
+def test_a_gap_of_the_resolution_is_none_and_a_share_is_between_0_and_1() -> None:
+    angle, whole = replace(ANGLE, resolution=0.25), [float(k) for k in range(20)]
+    assert one(planted({"a": whole, "b": [k + 0.25 for k in whole]}, "angle"), "angle", [angle]
+               ).differ == 0  # fmt: skip
+    sides = {"a": [0.0] * 19 + [0.2], "b": [1.0] * 20}
+    assert one(planted(sides, "placed"), "placed").high == 1.0
+    close = one(planted({"a": [1.0] * 100, "b": [1.0] * 99 + [14 / 15]}, "placed"), "placed")
+    assert close.verdict == "equivalent"
+    assert close.low < 0 < close.high
+
+
 def test_comparable_is_asked_about_both_sides_and_one_side_is_no_pair() -> None:
     rng = np.random.default_rng(9)
     sides = {"a": side(rng, 0.95), "b": side(rng, 0.5), "c": side(rng, 0.1)}

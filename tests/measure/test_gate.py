@@ -350,6 +350,11 @@ def test_how_few_are_too_few() -> None:
         for name in ("placed", "ram")
     )
     assert notes(6, 6, two) == ()
+    hit = made([1.0] * 4, metric="hit"), made([0.0] * 4, metric="hit")
+    assert run(*hit, "").notes == (
+        "metrics without a limit: 4 pairs are too few for a change to be significant among 1 "
+        "comparisons",
+    )
 
 
 def test_many_comparisons_can_fail_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -164,6 +164,7 @@ def test_verdicts() -> None:
     assert found.pairs[0, 2].crossed == (0, 3)
     assert math.isnan(found.tau(3, 3).mean)
     assert found.tau(1, 0) is found.pairs[0, 1].tau
+    assert found.mmrv(2, 0).mean == mmrv(same[::-1].mean(1), same.mean(1))
     assert compared(outcomes(SPREAD, SPREAD, seeds=20)).verdict(0, 1) == "open"
     assert compared(outcomes(steps, steps, seeds=300)).verdict(0, 1) == "alike"  # no seed alike
     assert compared(outcomes(SPREAD, SPREAD, seeds=300)).verdict(0, 1) == "alike"  # within ceilings

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from pytest_simbench.measure.limits import Limit
-from pytest_simbench.measure.watching import Step, of_laws, of_scene, of_tasks
+from pytest_simbench.measure.watching import Step, _task, of_laws, of_scene, of_tasks
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunContents
 from pytest_simbench.records.record import Record
@@ -73,6 +73,10 @@ def test_an_outcome_changes_in_either_direction_and_all_steps_share_the_error() 
     few = judged(good, bad, steps=600)
     assert [changed for changed, _ in few] == [False]
     assert "too few for a change of landed to be significant" in few[0][1]
+
+
+def test_a_task_is_named_without_its_variant() -> None:
+    assert _task("suite.py::test_falling[engine-a[0]]") == "falling"
 
 
 def test_a_release_that_crashes_has_changed() -> None:
