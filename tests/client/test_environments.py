@@ -206,6 +206,9 @@ def test_what_pip_is_configured_with(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert told == ["mine", 'it\'s "d"', "3", None]
     monkeypatch.delenv("PIP_INDEX_URL")
     assert package_index.pip_configuration()["index-url"] == "a"
+    monkeypatch.delenv("PIP_EXTRA_INDEX_URL")
+    config.write_text("[global]\nextra-index-url =\n    https://b\n    https://c\n")
+    assert package_index._indexes()[1:] == ["https://b", "https://c"]
 
 
 def test_pips_configuration_is_uvs_too(monkeypatch: pytest.MonkeyPatch) -> None:
