@@ -24,6 +24,7 @@ from pytest_simbench.records.folder import RECORDS, TASKS, RunContents, RunFolde
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name, opened, whole
 from pytest_simbench.records.record import Record, RecordError
+from pytest_simbench.records.repeatability import NAME
 from pytest_simbench.report.files import (
     Written,
     shown,
@@ -89,6 +90,8 @@ def _outcome(folders: Folders, readings: dict[str, RunContents]) -> tuple[RunOut
     outcomes = [outcome for outcome, _ in found]
     if len(outcomes) == 1:
         return outcomes[0], wrong
+    beside = [name for name, folder in folders.items() if (folder.path / NAME).is_file()]
+    wrong += [f"{name}: what it found on repeatability is of that run alone" for name in beside]
     passed = [outcome.passed for outcome in outcomes]
     unknown = None in passed or any(reading.claims for reading in readings.values())
     together = False if False in passed else None if unknown else True

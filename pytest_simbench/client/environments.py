@@ -35,6 +35,9 @@ from pytest_simbench.simulator.info import SimulatorInfo, alternatives, importab
 MARKER = "simbench.json"
 VARIABLE = "SIMBENCH_ENVIRONMENTS"
 
+LOCK = ".{}.lock"
+"""Beside an environment, from when it is begun: what has neither that nor a marker is not ours."""
+
 LOOK_PERIOD = 0.5
 """Between two looks at what is there already [s]."""
 
@@ -212,7 +215,7 @@ def alone(folder: Path, tell: Tell) -> Iterator[None]:
         SimulatorError: their folder cannot be written to.
     """
     try:
-        lock = opened(folder.parent, f".{folder.name}.lock", os.O_RDWR | os.O_CREAT)
+        lock = opened(folder.parent, LOCK.format(folder.name), os.O_RDWR | os.O_CREAT)
     except OSError as error:
         raise SimulatorError(
             f"environments cannot be made in {folder.parent} ({error.strerror})"
@@ -280,8 +283,9 @@ def foreign(folder: Path) -> str:
     """That something else is in an environment's place, as a sentence; empty if nothing is."""
     if folder.is_symlink():
         return f"{folder} is a link, which is left alone; remove it, then there is room for ours"
-    if os.path.lexists(folder) and not folder.is_dir():
-        return f"{folder} is no folder; move it away, then there is room for an environment"
+    ours = (folder / MARKER).exists() or folder.with_name(LOCK.format(folder.name)).exists()
+    if os.path.lexists(folder) and not (ours and folder.is_dir()):
+        return f"{folder} is no environment of ours; move it away, then there is room for one"
     return ""
 
 

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
+from ast import literal_eval
 from bisect import bisect
 from collections.abc import Iterable
 from contextlib import suppress
@@ -109,7 +110,8 @@ def pip_configuration() -> dict[str, str]:
         key, equals, value = line.partition("=")
         section, _, name = key.rpartition(".")
         if equals and section in ("global", "install", ":env:"):
-            found[name] = os.environ.get(f"PIP_{name.upper().replace('-', '_')}") or value[1:-1]
+            variable = f"PIP_{name.upper().replace('-', '_')}"
+            found[name] = os.environ.get(variable) or literal_eval(value)
     return found
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _POOL: pytest.StashKey[Pool] = pytest.StashKey()
 
-HERE_ONLY = ("sim_python", "sim_spec", "sim_pictures", "sim_install_missing")
+HERE_ONLY = ("sim_python", "sim_spec", "sim_pictures", "sim_video", "sim_install_missing")
 """Options of this machine, which mean nothing on a node."""
 
 
@@ -35,7 +35,7 @@ def pool(config: pytest.Config) -> Pool:
     if _POOL not in config.stash:
         given = f"--sim-cluster={options.value(config, 'sim_cluster')}"
         for name in HERE_ONLY:
-            if options.value(config, name):
+            if options.value(config, name) != options.option(name).default:
                 flag = options.option(name).sure
                 raise pytest.UsageError(
                     f"{given}: {flag} is for simulators on this machine; leave out one of them"

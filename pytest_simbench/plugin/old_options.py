@@ -100,7 +100,7 @@ def _bisect(config: pytest.Config, span: str, metric: str) -> int:
 
     words = list(config.invocation_params.args)
     place = words.index("--sim-bisect")
-    rest = [w for w in [*words[:place], *words[place + 3 :]] if not w.startswith("--sim-output=")]
+    rest = [*words[:place], *words[place + 3 :]]
     if not config.pluginmanager.is_registered(bisect):
         _announce("--sim-bisect", ["bisect", span, metric, *rest])
     with options.refusing((values.BadInput, SimulatorError), "simbench bisect"):

@@ -92,7 +92,8 @@ class Run:
         output, resume = (options.value(config, f"sim_{name}") for name in ("output", "resume"))
         if resume is not None:
             given = "" if resume is True else resume  # the option without a value
-            if given and output and given != output:
+            typed = given and options.given(config, "sim_output")
+            if typed and Path(here, given) != Path(here, output):
                 raise pytest.UsageError(
                     f"--sim-resume {given} and --sim-output {output}: a run is completed in its "
                     "own folder, so leave out --sim-output"

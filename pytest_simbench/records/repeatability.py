@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, TypedDict
 import msgspec
 
 from pytest_simbench.records import checked, lines
+from pytest_simbench.records.configuration import TASK, text
 from pytest_simbench.records.lines import Found, LinesFile, Unwritten
 from pytest_simbench.records.metrics import significant
 
@@ -153,7 +154,8 @@ def append(folder: Path, line: Line) -> Unwritten:
 
 
 def read(folder: Path) -> Found[Line]:
-    """The lines of a run, in the order of their tests' ids; none when there is no file.
+    """The lines of a run, in the order of their tests' ids; none when there is no file. Of what was
+    asked again, in a run that was completed, the last one.
 
     Raises:
         UnreadableError: there is one, and it cannot be read.
@@ -161,8 +163,15 @@ def read(folder: Path) -> Found[Line]:
     if not os.path.lexists(folder / NAME):
         return Found()
     found = lines.read(folder, NAME, _line)
-    items = sorted(found.items, key=lambda line: (line.kind, line.task, line.test))
+    last = {_asked(line): line for line in found.items}
+    items = sorted(last.values(), key=lambda line: (line.kind, line.task, line.test))
     return replace(found, items=tuple(items))
+
+
+def _asked(line: Line) -> str:
+    parameters = {key: value for key, value in line.settings.items() if key.startswith(TASK)}
+    asked = [line.result.get(name) for name in ("bounds", "perturbation")]
+    return text([line.kind, line.test, line.task, line.seed, parameters, asked])
 
 
 def _line(data: dict[str, Any], where: str) -> Line:

@@ -17,6 +17,7 @@ from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.record import Record
+from pytest_simbench.records.repeatability import NAME
 from pytest_simbench.report.files import write_outcome
 from pytest_simbench.report.model.outcome import RunOutcome
 from pytest_simbench.report.model.report import Report
@@ -72,6 +73,8 @@ def test_logs_and_traces_are_copied_under_names_of_ours(here: Path) -> None:
 def test_claims_of_parts_are_not_those_of_the_whole(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    (here / "b").mkdir()
+    (here / "b" / NAME).touch()
     for name, seed in (("a", 1), ("b", 2)):
         saved(here / name, seed, "")
         RunFolder(here / name).claim(claim(verdict="PASS"))
@@ -81,6 +84,7 @@ def test_claims_of_parts_are_not_those_of_the_whole(
     told = capsys.readouterr().out
     assert told.startswith("no claim was judged; 0 of 2 repetitions crashed")
     assert "pytest --sim-resume=whole judges the claims of the whole\n" in told
+    assert "b: what it found on repeatability is of that run alone\n" in told
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,7 @@ def half_made(info: SimulatorInfo) -> Environment:
     environment = Environment.of(info)
     environment.python.parent.mkdir(parents=True)
     environment.python.touch()
+    environment.folder.with_name(f".{info.name}.lock").touch()
     return environment
 
 
@@ -137,23 +138,26 @@ def test_what_is_there_and_removing_it(info: SimulatorInfo) -> None:
     assert list(existing()) == []
 
 
-@pytest.mark.parametrize("kind", ["link", "dangling link", "file"])
+@pytest.mark.parametrize("kind", ["link", "dangling link", "file", "folder"])
 def test_what_else_is_in_its_place_is_left_alone(
     info: SimulatorInfo, tmp_path: Path, kind: str
 ) -> None:
     environment, elsewhere = Environment.of(info), tmp_path / "elsewhere"
-    environment.folder.parent.mkdir()
+    environment.folder.parent.mkdir(exist_ok=True)
     if kind == "file":
         environment.folder.touch()
+    elif kind == "folder":  # somebody's clone of an engine, or an environment of their own
+        half_made(info).folder.with_name(".sixth.lock").unlink()
     else:
         environment.folder.symlink_to(elsewhere)
     if kind == "link":
         elsewhere.mkdir()
         (elsewhere / MARKER).write_text("mine")
     for act in (environment.create, lambda: remove(environment.folder)):
-        with pytest.raises(SimulatorError, match="is a link|is no folder"):
+        with pytest.raises(SimulatorError, match="is a link|is no environment of ours"):
             act()
-    assert environment.folder.is_symlink() == (kind != "file")
+    assert environment.folder.is_symlink() == ("link" in kind)
+    assert environment.python.exists() == (kind == "folder")
     assert kind != "link" or (elsewhere / MARKER).read_text() == "mine"
 
 
@@ -206,6 +210,9 @@ def test_what_pip_is_configured_with(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert told == ["mine", 'it\'s "d"', "3", None]
     monkeypatch.delenv("PIP_INDEX_URL")
     assert package_index.pip_configuration()["index-url"] == "a"
+    monkeypatch.delenv("PIP_EXTRA_INDEX_URL")
+    config.write_text("[global]\nextra-index-url =\n    https://b\n    https://c\n")
+    assert package_index._indexes()[1:] == ["https://b", "https://c"]
 
 
 def test_pips_configuration_is_uvs_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -47,6 +47,18 @@ def test_a_folder_with_a_run_is_refused_before_anything_runs(pytester: pytest.Py
     assert {path: path.read_bytes() for path in before} == before
 
 
+def test_a_run_is_resumed_whatever_folder_the_ini_file_names(pytester: pytest.Pytester) -> None:
+    """Typed beside it, another folder is a mistake, and the same one is none."""
+    pytester.makepyfile(TEST)
+    run(pytester, "--sim-output=o", passed=1)
+    pytester.makeini("[pytest]\nsim_output = p\n")
+    run(pytester, "--sim-resume=o", passed=1)
+    run(pytester, "--sim-resume=o", "--sim-output", str(pytester.path / "o"), passed=1)
+    result = run(pytester, "--sim-resume=o", "--sim-output=p")
+    usage_error(result, "ERROR: *a run is completed in its own folder, so leave out --sim-output")
+    assert not Path("p").exists()
+
+
 @pytest.mark.parametrize("words", ["--sim-output=o", "--sim-output=o -n1", "-osim_output=o -n1"])
 def test_two_processes_on_one_folder(pytester: pytest.Pytester, words: str) -> None:
     pytester.makepyfile(TEST.replace("0.2", "30.0"))

@@ -34,10 +34,29 @@ REPLAY = replace(LINE, kind="replay", result={"claims": True, "again": [AGAIN]})
 def test_kept_and_read_back(tmp_path: Path) -> None:
     folder = tmp_path / "a" / "run"
     assert read(folder).items == ()
-    for line in (LINE, REPLAY, LINE):
+    for line in (LINE, REPLAY):
         append(folder, line)
-    assert read(folder).items == (REPLAY, LINE, LINE)
+    assert read(folder).items == (REPLAY, LINE)
     assert LINE.label == "mujoco headless tuned"
+
+
+def test_what_is_asked_again_replaces_what_was_said(tmp_path: Path) -> None:
+    """As in a run that is completed; other tasks, seeds, bounds are asked besides."""
+    now = replace(LINE, settings={"timestep": 0.2}, versions={"mujoco": "2"})
+    others = [
+        replace(LINE, test="t::y"),
+        replace(LINE, kind="stability"),
+        replace(LINE, task="towering"),
+        replace(LINE, seed=2),
+        replace(LINE, settings={"task.layers": 2}),
+        replace(LINE, result={**LINE.result, "bounds": "1 mm"}),
+        replace(LINE, result={**LINE.result, "perturbation": "x"}),
+    ]
+    for line in (LINE, *others, now):
+        append(tmp_path, line)
+    found = read(tmp_path).items
+    assert len(found) == 8
+    assert all(line in found for line in (*others, now))
 
 
 @pytest.mark.parametrize(
@@ -80,9 +99,9 @@ def test_something_else_loses_no_other_line(tmp_path: Path, text: str) -> None:
     append(tmp_path, LINE)
     with (tmp_path / NAME).open("a") as file:
         file.write(text)  # torn: no end of the line
-    append(tmp_path, LINE)
+    append(tmp_path, REPLAY)
     found = read(tmp_path)
-    assert found.items == (LINE, LINE)
+    assert found.items == (REPLAY, LINE)
     (problem,) = (*found.problems, *found.refused)
     assert problem.startswith(f"{tmp_path / NAME}:2: ")
     assert len(problem) < 400
