@@ -308,6 +308,7 @@ def test_side_by_side_nothing_begins_with_too_few_seeds_or_once_closed() -> None
         ({"profile": "best"}, "best"),
         ({"robot": "nobody"}, "unknown robot 'nobody'"),
         ({"colour": 1}, "parameter='colour': choose from command_latency, observation_delay"),
+        ({"settle": 1.0}, "parameter='settle': choose from"),  # an episode has no such end
         ({"num_envs": 0}, "num_envs=0: give a whole number from 1 on"),
     ],
     ids=str,
