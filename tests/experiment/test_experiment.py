@@ -20,8 +20,9 @@ from pytest_simbench.laws.free import FreeFall
 from pytest_simbench.motion.model import scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
-from pytest_simbench.records.record import Record
+from pytest_simbench.records.record import Failure, Record
 from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks import Reaching, Settling
 from pytest_simbench.tasks.base import Task
 from tests.description.test_urdf_check import stl
@@ -173,6 +174,18 @@ def test_the_live_line_is_told_of_each_repetition(case: Case) -> None:
         call.repetition(1, 10001, ""), call.end_repetition("ok", 1.0),
         call.repetition(3, 10003, ""), call.end_repetition("ok", 1.0), call.end_test(),
     ]  # fmt: skip
+
+
+def test_a_policy_that_cannot_be_asked_is_no_crash(case: Case) -> None:
+    kept, told = list[Record](), "no multiple of the time step"
+    failed = {"status": "failed", "error": Failure("LoopError", told, "act")}
+    for noted in (False, True):  # as a search does, where a step that does not fit is a finding
+        worker = MadeUp(1, lambda experiment, number: (failed, LoopError(told)))
+        repeater = Repeater(Experiment(case, Falling()), worker, Mock(), kept.append)
+        repeater.records_refusals = noted
+        with pytest.raises(LoopError, match=told):
+            repeater.run([1, 2])
+        assert len(kept) == noted
 
 
 def test_each_protocol_has_its_version_of_a_task(case: Case) -> None:
