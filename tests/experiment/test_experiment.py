@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 from unittest.mock import Mock, call
 
 import pytest
@@ -21,7 +22,7 @@ from pytest_simbench.motion.model import scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
 from pytest_simbench.records.record import Failure, Record
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.scene import Box, Pose, Scene, SceneError
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks import Reaching, Settling
 from pytest_simbench.tasks.base import Task
@@ -176,16 +177,22 @@ def test_the_live_line_is_told_of_each_repetition(case: Case) -> None:
     ]  # fmt: skip
 
 
-def test_a_policy_that_cannot_be_asked_is_no_crash(case: Case) -> None:
-    kept, told = list[Record](), "no multiple of the time step"
-    failed = {"status": "failed", "error": Failure("LoopError", told, "act")}
-    for noted in (False, True):  # as a search does, where a step that does not fit is a finding
-        worker = MadeUp(1, lambda experiment, number: (failed, LoopError(told)))
-        repeater = Repeater(Experiment(case, Falling()), worker, Mock(), kept.append)
+@pytest.mark.parametrize("kind", [LoopError, SceneError])
+def test_what_cannot_be_is_no_crash_of_the_simulator(case: Case, kind: type[Exception]) -> None:
+    """But where a search or a sweep over steps asks for it, it is a finding."""
+
+    def end(experiment: Experiment, number: int) -> tuple[dict[str, Any], Exception | None]:
+        failed = {"status": "failed", "error": Failure(kind.__name__, "no such world", "act")}
+        ok = {"status": "ok", "metrics": {"landed": 1.0}}
+        return (failed, kind("no such world")) if number == 2 else (ok, None)
+
+    for noted in (False, True):
+        kept: list[Record] = []
+        repeater = Repeater(Experiment(case, Falling()), MadeUp(1, end), Mock(), kept.append)
         repeater.records_refusals = noted
-        with pytest.raises(LoopError, match=told):
-            repeater.run([1, 2])
-        assert len(kept) == noted
+        with pytest.raises(kind, match="^no such world$"):
+            repeater.run([1, 2, 3])
+        assert [record.status for record in kept] == ["ok"] + ["failed"] * noted
 
 
 def test_each_protocol_has_its_version_of_a_task(case: Case) -> None:
