@@ -135,11 +135,10 @@ class Repeater:
             repetition.kill()
         record, error = repetition.run()
         self._active.discard(repetition)
-        sought = self.records_refusals or experiment.case.own_timestep
-        impossible = isinstance(error, SceneError) and not sought
-        told = isinstance(error, SceneRefused) and (self._recorded or sought)
-        refused = isinstance(error, Unavailable) and not told
-        if impossible or refused:  # no fault of the simulator
+        found = self.records_refusals or experiment.case.own_timestep
+        told = isinstance(error, SceneRefused) and (self._recorded or found)
+        told = told or (isinstance(error, SceneError) and found)
+        if isinstance(error, Unavailable | SceneError) and not told:  # no fault of the simulator
             self._ended_early = True
             raise error
         if error is not None and record.status == "interrupted":
