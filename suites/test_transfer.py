@@ -14,6 +14,7 @@ A policy that fails is a finding, and no failure: a test fails when its repetiti
 
 import pytest
 
+from pytest_simbench import Policy
 from pytest_simbench.tasks import PickAndPlace, PushingToGoal
 
 TIME = {"pushing": 5.0, "picking": 3.5}
@@ -55,4 +56,5 @@ def test_picking(repeat, policy):
 @pytest.mark.policies("pushing", "scripted")
 @pytest.mark.parametrize("delay", DELAYS)
 def test_pushing_with_delay(repeat, policy, delay):
-    repeat(pushing(policy, **{name: k / policy.rate for name, k in DELAYS[delay].items()}))
+    rate = getattr(policy, "rate", Policy.rate)
+    repeat(pushing(policy, **{name: k / rate for name, k in DELAYS[delay].items()}))

@@ -27,6 +27,7 @@ from pytest_simbench.records.paths import write_whole
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.files import shown
 from pytest_simbench.report.terminal.grid import aligned
+from pytest_simbench.scene import SceneError
 from pytest_simbench.scene.pair_friction import OF_PAIRS
 from pytest_simbench.tasks import Fitting
 from pytest_simbench.tuning.fitting import Fit, State
@@ -34,7 +35,7 @@ from pytest_simbench.tuning.search import folder_name
 from pytest_simbench.tuning.target import FIRST_CHOSEN
 from pytest_simbench.tuning.telling import Told
 from pytest_simbench.tuning.telling import told as told_of
-from pytest_simbench.tuning.unknowns import unknowns
+from pytest_simbench.tuning.unknowns import begun, unknowns
 
 FILE = "file"
 """The profile that loads a user's file as it is, whatever the scene says."""
@@ -66,6 +67,8 @@ def fit(
     told = read_log(log, world)
     for line in beyond(told, world):
         print(for_terminal(f"{log}: {line}"), file=sys.stderr)
+    with refusing(SceneError, log):
+        begun(world, told)
     sought = unknowns(list(chain.from_iterable(unknown or ())), world, told)
     parts = (variant.simulator, Path(scene).stem, variant.profile, told.digest, noise, *sought)
     path = Path(output) if output else Path(RUNS) / folder_name(parts, "fit")

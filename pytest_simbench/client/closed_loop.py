@@ -144,10 +144,20 @@ class Looking:
 
     Attributes:
         picture: width and height of a picture [pixels]; None: none.
+
+    Raises:
+        LoopError: a picture of another form.
     """
 
     forces: bool = False
     picture: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        match self.picture:
+            case None | [int(), int()] if min(self.picture or [1]) > 0:
+                return
+        told = "give its width and height, two whole numbers of pixels"
+        raise LoopError(f"picture={self.picture!r:.60}: {told}")
 
 
 class ClosedLoop:

@@ -110,18 +110,18 @@ def default_folder() -> Path:
     return Path(cache) / "pytest-simbench" / "data"
 
 
-def read(name: str, folder: Path | None = None) -> Any:
+def read(name: str, folder: str | Path | None = None) -> Any:
     """A data set, from a folder or where data sets are.
 
     Raises:
         DataMissing: it is not there.
         DataError: there is no such set, or what is there is broken.
     """
-    found, folder = data_set(name), folder or default_folder()
-    held = found.read(folder) if folder.is_dir() else None
+    found, place = data_set(name), Path(folder or default_folder())
+    held = found.read(place) if place.is_dir() else None
     if held is None:
         raise DataMissing(
-            f"the data set {name} ({found.title}) is not in {folder}: "
+            f"the data set {name} ({found.title}) is not in {place}: "
             f"simbench download {name}, or --sim-data DIR (simbench: ${VARIABLE})"
         )
     return held

@@ -18,6 +18,7 @@ from pytest_simbench.experiment.resumed import Resumed
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import short
+from pytest_simbench.scene import SceneError
 from pytest_simbench.tasks.recorded import code_of
 
 __tracebackhide__ = True  # a mistake in a task is told at its own line
@@ -43,8 +44,9 @@ class Repeater:
         keep: takes every record at once, before anything else can go wrong.
         begin: is called before the first progress.
         resumed: the interrupted run that is completed, if one is.
-        records_refusals: whether a scene that is refused is a repetition that failed, as it is at
-            another time step, and after a repetition of the same test that was not refused.
+        records_refusals: whether a scene that is refused or cannot be, or a policy that cannot be
+            asked, is a repetition that failed, as it is at another time step; the first also after
+            a repetition of the same test that was not refused.
     """
 
     experiment: Experiment
@@ -80,6 +82,7 @@ class Repeater:
         Raises:
             Unavailable: the machine lacks what it takes, in this mode at least, or the scene of the
                 first repetition is refused.
+            SceneError: a scene cannot be, or a policy cannot be asked as it shall be.
             WorldParityError: the engine builds another world; more repetitions would not help.
             KeyboardInterrupt: after the records of what was running are kept.
         """
@@ -132,9 +135,10 @@ class Repeater:
             repetition.kill()
         record, error = repetition.run()
         self._active.discard(repetition)
-        a_failure = self._recorded or self.records_refusals or experiment.case.own_timestep
-        told = isinstance(error, SceneRefused) and a_failure
-        if isinstance(error, Unavailable) and not told:  # nothing was simulated
+        found = self.records_refusals or experiment.case.own_timestep
+        told = isinstance(error, SceneRefused) and (self._recorded or found)
+        told = told or (isinstance(error, SceneError) and found)
+        if isinstance(error, Unavailable | SceneError) and not told:  # no fault of the simulator
             self._ended_early = True
             raise error
         if error is not None and record.status == "interrupted":

@@ -71,6 +71,7 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         weakref.finalize(self, folder.cleanup)
         weakref.finalize(self, handle.close)  # the newest goes first
         self._loop: ClosedLoop | None = None
+        self._picture: Any = None
         self._observed: dict[str, FloatArray] = {}
         self._info: dict[str, Any] = {}
         scene = task.scene(0, Jitter(0.0, 0.0))
@@ -188,6 +189,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         """The picture of the newest state, (height, width, 3)."""
         if self.render_mode is None:
             raise UnsupportedMode("make the environment with render_mode='rgb_array' for pictures")
+        if self._picture is None:
+            raise ResetNeeded("no picture was taken yet: call reset()")
         return self._picture
 
     def _leave(self) -> None:

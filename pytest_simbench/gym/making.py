@@ -75,8 +75,9 @@ def make(
     chosen: Any = task
     if not isinstance(task, GoalTask):
         chosen = TASKS[_choose("task", task, TASKS)](None)
+    taken = {item.name for item in fields(chosen)} - {"policy", "inside", "settle"}
     for name in parameters:
-        _choose("parameter", name, {item.name for item in fields(chosen)} - {"policy", "inside"})
+        _choose("parameter", name, taken)
     with refusing((SimulatorError, SceneError, RobotError)):
         chosen = replace(chosen, **{"rate": chosen.rate or RATE, **parameters})
         if robot is not None:

@@ -42,7 +42,7 @@ FINEST = 1e-3
 """Steps of a log are kept down to this [s]."""
 
 FARTHEST = 1e9
-"""Any number of a log."""
+"""Any number of a log but its times, which may count from 1970."""
 
 MOST = 1_000_000
 """Messages of a recording."""
@@ -88,7 +88,7 @@ def _log(columns: Columns, scene: Scene, robot: Robot | None) -> Log:
     steps, lasts = np.diff(time), float(time[-1] - time[0])
     if (steps <= 0).any():
         row = int(np.argmax(steps <= 0)) + 1
-        raise ValueError(f"goes from {time[row - 1]:g} s to {time[row]:g} s in row {row}")
+        raise ValueError(f"goes from {time[row - 1]:.12g} s to {time[row]:.12g} s in row {row}")
     if not SHORTEST <= lasts <= LONGEST:
         raise ValueError(f"lasts {lasts:g} s; {SHORTEST:g} to {LONGEST:g} s are read")
     grid = np.linspace(0.0, lasts, max(1, round(lasts / max(np.median(steps), FINEST))) + 1)
@@ -105,6 +105,8 @@ def _log(columns: Columns, scene: Scene, robot: Robot | None) -> Log:
         wanted = (len(time), 7) if name in bodies else (len(time),)
         if array.shape != wanted:
             raise ValueError(f"holds {name!r:.80} in the shape {array.shape} instead of {wanted}")
+        if np.abs(array).max() > FARTHEST:
+            raise ValueError(f"has a number of {name!r:.80} beyond {FARTHEST:g} (in SI units)")
         digest.update(name.encode() + array.tobytes())
         if name in places:
             part, k = places[name]
@@ -153,8 +155,6 @@ def _numbers(name: str, array: np.ndarray) -> FloatArray:
     finite = np.isfinite(array).all(axis=tuple(range(1, array.ndim)))
     if not finite.all():
         raise ValueError(f"has no finite number of {name!r:.80} in row {int(np.argmin(finite))}")
-    if np.abs(array).max(initial=0.0) > FARTHEST:
-        raise ValueError(f"has a number of {name!r:.80} beyond {FARTHEST:g}, and is in SI units")
     return np.asarray(array, dtype=float)
 
 

@@ -115,6 +115,7 @@ class SetPoints:
         arm = [robot.joint_names.index(joint.name) for joint in robot.arm_joints]
         self._arm = np.array(arm, dtype=int)
         self._driven = robot.column("stiffness") > FREE
+        self._motors = all(joint.motor for joint in robot.arm_joints)
         if kinematics is not None:
             self.effort = kinematics.holding_effort(self.position)
 
@@ -130,6 +131,11 @@ class SetPoints:
         ways = [way for way in WAYS if getattr(command, way) is not None]
         if len(ways) > 1:
             raise PolicyError(f"the policy commands {' and '.join(ways)} at once; choose one")
+        if ways and self._motors and command.effort is None:
+            raise PolicyError(
+                f"the policy commands {ways[0]} alone, and the arm's joints are motors, which push "
+                "efforts alone; answer an effort"
+            )
         position = self.position.copy()
         if command.position is not None:
             self._put(position, command.position, "position")

@@ -5,13 +5,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import Any, ClassVar, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar, get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from pytest_simbench.data.measured import Measured, MeasuredMotion
+from pytest_simbench.data.measured import Half, Measured, MeasuredMotion
 from pytest_simbench.scene import FloatArray
+from pytest_simbench.scene.checks import check_choice, check_count
 from pytest_simbench.tasks.base import Task
 
 M = TypeVar("M", bound=MeasuredMotion)
@@ -23,12 +24,21 @@ class MeasuredTask(Task, Generic[M]):
 
     Attributes:
         smallest: how many motions its smallest version goes through, where it has a field `most`.
+
+    Raises:
+        SceneError: a half that is none, or `most` that is no number of motions.
     """
 
     study_timeout: ClassVar[float] = 300.0
     shares_worker: ClassVar[bool] = True
     data: ClassVar[str]
     smallest: ClassVar[int | None] = None
+    half: Half
+
+    def __post_init__(self) -> None:
+        check_choice(self.half, f"the half of {self.data}", get_args(Half))
+        if (most := getattr(self, "most", None)) is not None:
+            check_count(most, f"`most` of {self.data}")
 
     @property
     @abstractmethod

@@ -144,7 +144,7 @@ def test_a_policy_that_cannot_be_asked_is_one_sentence(scripted: dict[str, Any])
     scripted["mujoco"] = LoopError
     run = simbench.run(Falling(), TWO, reps=2)
     assert run.problems == ("mujoco: no such luck",)
-    assert len(run.contents.every) == 4
+    assert [r.status for r in run.contents.every] == ["ok"] * 3  # it is no crash
 
 
 def test_a_jitter_that_makes_starts_overlap_is_no_crash(scripted: dict[str, Any]) -> None:

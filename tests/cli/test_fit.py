@@ -56,6 +56,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     told = np.full(len(TIME), 0.2)
     np.savez(tmp_path / "log.npz", time=TIME, hinge=noisy, **{"hinge/command": told})
     np.savez(tmp_path / "other.npz", time=TIME, knee=noisy)
+    ball = '<body name="ball" pos="1 0 .1"><freejoint/><geom size=".1"/></body></worldbody>'
+    (tmp_path / "ball.xml").write_text(DRIVE.format(25, 12).replace("</worldbody>", ball))
+    pose = np.tile([1000.0, 0, 100, 1, 0, 0, 0], (len(TIME), 1))
+    np.savez(tmp_path / "mm.npz", time=TIME, **{"ball/pose": pose})
     return tmp_path
 
 
@@ -107,6 +111,7 @@ def test_the_mass_and_both_gains_are_not_told_apart(
         ({"log.npz": "other.npz"}, "holds 'knee', which scene 'drive' has not"),
         ({"0.001": "0"}, "give a number from 1e-09 to 1"),
         ({"drive.xml": "none.xml"}, "none.xml"),
+        ({"drive.xml": "ball.xml", "log.npz": "mm.npz"}, "'ball' is outside the room"),
         ({"damping:hinge": "damping:hinge=1..1e15"}, "'damping:hinge=1..1e15': the damping of"),
         ({"--noise": "--profile", "0.001": "file"}, "loads the scene as it is written"),
     ],

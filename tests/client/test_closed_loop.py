@@ -229,6 +229,8 @@ def test_a_worker_that_dies_is_told(world: Worlds) -> None:
     [
         ({"rate": 30.0}, "at 30 Hz is asked every 33.33 ms, which is no multiple"),
         ({"until": 0.0}, "the seconds of a closed loop"),
+        ({"picture": (0, 48)}, r"picture=\(0, 48\): give its width and height, two whole numbers"),
+        ({"picture": "big"}, "picture='big': give its width and height"),
         ({"inside": True, "until": bool}, "inside the worker takes no until=a function"),
         ({"inside": True, "observation_delay": 0.02}, "takes no observation_delay"),
     ],

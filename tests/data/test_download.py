@@ -94,7 +94,7 @@ def test_a_server_that_is_not_there_is_one_sentence(source: Local, tmp_path: Pat
 
 def test_a_set_that_is_not_there_says_what_brings_it(tmp_path: Path) -> None:
     with pytest.raises(DataMissing, match="simbench download cube_tosses, or --sim-data DIR"):
-        read("cube_tosses", tmp_path)
+        read("cube_tosses", str(tmp_path))
 
 
 def test_an_unknown_set_lists_those_there_are() -> None:

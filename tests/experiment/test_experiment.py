@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 from unittest.mock import Mock, call
 
 import pytest
@@ -20,8 +21,9 @@ from pytest_simbench.laws.free import FreeFall
 from pytest_simbench.motion.model import scale_of
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
-from pytest_simbench.records.record import Record
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.records.record import Failure, Record
+from pytest_simbench.scene import Box, Pose, Scene, SceneError
+from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks import Reaching, Settling
 from pytest_simbench.tasks.base import Task
 from tests.description.test_urdf_check import stl
@@ -173,6 +175,24 @@ def test_the_live_line_is_told_of_each_repetition(case: Case) -> None:
         call.repetition(1, 10001, ""), call.end_repetition("ok", 1.0),
         call.repetition(3, 10003, ""), call.end_repetition("ok", 1.0), call.end_test(),
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [LoopError, SceneError])
+def test_what_cannot_be_is_no_crash_of_the_simulator(case: Case, kind: type[Exception]) -> None:
+    """But where a search or a sweep over steps asks for it, it is a finding."""
+
+    def end(experiment: Experiment, number: int) -> tuple[dict[str, Any], Exception | None]:
+        failed = {"status": "failed", "error": Failure(kind.__name__, "no such world", "act")}
+        ok = {"status": "ok", "metrics": {"landed": 1.0}}
+        return (failed, kind("no such world")) if number == 2 else (ok, None)
+
+    for noted in (False, True):
+        kept: list[Record] = []
+        repeater = Repeater(Experiment(case, Falling()), MadeUp(1, end), Mock(), kept.append)
+        repeater.records_refusals = noted
+        with pytest.raises(kind, match="^no such world$"):
+            repeater.run([1, 2, 3])
+        assert [record.status for record in kept] == ["ok"] + ["failed"] * noted
 
 
 def test_each_protocol_has_its_version_of_a_task(case: Case) -> None:

@@ -272,6 +272,8 @@ def test_what_is_asked_too_early_is_refused() -> None:
     told = "^make the environment with render_mode='rgb_array' for pictures$"
     with pytest.raises(UnsupportedMode, match=told):
         env.render()
+    with pytest.raises(ResetNeeded, match=r"^no picture was taken yet: call reset\(\)$"):
+        make("pushing", "mujoco", python="p", render_mode="rgb_array").render()
     for wrong in ("up", [[1.0], [1.0, 2.0]], np.zeros(4)):
         with pytest.raises(InvalidAction, match=r"^an action is finite numbers of shape \(5,\)"):
             checked(wrong, env.action_space)
@@ -306,6 +308,7 @@ def test_side_by_side_nothing_begins_with_too_few_seeds_or_once_closed() -> None
         ({"profile": "best"}, "best"),
         ({"robot": "nobody"}, "unknown robot 'nobody'"),
         ({"colour": 1}, "parameter='colour': choose from command_latency, observation_delay"),
+        ({"settle": 1.0}, "parameter='settle': choose from"),  # an episode has no such end
         ({"num_envs": 0}, "num_envs=0: give a whole number from 1 on"),
     ],
     ids=str,

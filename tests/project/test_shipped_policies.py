@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -74,6 +75,12 @@ def test_what_a_policy_sees_is_off_by_what_its_page_says() -> None:
     offsets = np.mean(looks, axis=1)
     assert np.std(offsets) == pytest.approx(0.005, rel=0.1)
     assert np.std(looks - offsets[:, None]) == pytest.approx(0.002, rel=0.1)
+
+
+def test_a_delay_is_in_periods_of_a_policy_that_says_no_rate() -> None:
+    asked: list[GoalTask] = []
+    suite.test_pushing_with_delay(asked.append, SimpleNamespace(act=print), "late2")
+    assert asked[0].command_latency == 0.04  # of 50 Hz, at which it is asked
 
 
 @pytest.mark.engine

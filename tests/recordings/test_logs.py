@@ -39,10 +39,11 @@ def table(folder: Path, text: str) -> Path:
     return folder / "log.csv"
 
 
-def test_a_joint_that_is_not_named_holds_its_start(tmp_path: Path) -> None:
-    log = read_log(npz(tmp_path, time=TIME + 3.0, hinge=HINGE), SCENE)
+@pytest.mark.parametrize("begins", [3.0, 1.7e9])  # as of a robot, whose clock counts from 1970
+def test_a_joint_that_is_not_named_holds_its_start(tmp_path: Path, begins: float) -> None:
+    log = read_log(npz(tmp_path, time=TIME + begins, hinge=HINGE), SCENE)
     assert log.trajectory.tick == pytest.approx(0.05)
-    assert log.trajectory.position[:, 0] == pytest.approx(HINGE)
+    assert log.trajectory.position[:, 0] == pytest.approx(HINGE, abs=1e-6)
     assert (log.trajectory.position[:, 1] == 0.05).all()
     assert not log.trajectory.velocity.any()
     assert log.joints == ["hinge"]
@@ -160,8 +161,9 @@ def test_a_recording_of_ours_is_read_back(
         ({"time": TIME, "knee": TIME}, "holds 'knee'.* it has hinge, slider, table/pose"),
         ({"time": TIME, "table/pose": np.zeros((21, 7)), "hinge": TIME}, "no unit length"),
         ({"time": TIME, "hinge": TIME * np.nan}, "no finite number of 'hinge' in row 0"),
-        ({"time": TIME, "hinge": TIME * 1e10}, "a number of 'hinge' beyond 1e.09, and is in SI"),
+        ({"time": TIME, "hinge": TIME * 1e10}, "a number of 'hinge' beyond 1e.09 .in SI units"),
         ({"time": TIME[::-1], "hinge": TIME}, "goes from 1 s to 0.95 s in row 1"),
+        ({"time": 1.7e9 - TIME, "hinge": TIME}, "goes from 1700000000 s to 1699999999.95 s in row"),
         ({"time": np.minimum(TIME, 0.5), "hinge": TIME}, "goes from 0.5 s to 0.5 s in row 11"),
         ({"time": TIME, "hinge": TIME[1:]}, r"'hinge' in the shape \(20,\) instead of \(21,\)"),
         ({"time": TIME, "hinge": np.array(["a"] * 21)}, "which is no column of numbers"),

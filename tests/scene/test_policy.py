@@ -204,6 +204,10 @@ def test_motors_take_efforts_alone() -> None:
     assert at.effort.tolist() == [*range(7), 0.0, 0.0]
     at.after(Command(gripper=0.03))  # without a model of the hand each finger goes half the way
     assert at.position[7:].tolist() == [0.015, 0.015]
+    at.after(Command(position=[*range(9)], effort=np.zeros(7)))  # moves the fingers
+    for answer in (Command(tool_change=np.zeros(6)), Command(velocity=np.zeros(9)), np.zeros(7)):
+        with pytest.raises(PolicyError, match="alone, and the arm's joints are motors, which push"):
+            at.after(answer)
 
 
 def test_a_robot_without_a_hand_is_moved_by_all_its_joints() -> None:

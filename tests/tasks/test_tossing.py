@@ -17,7 +17,7 @@ from pytest_simbench.experiment.executor import LocalExecutor
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.tuned_on import Seen
-from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, SceneError
 from pytest_simbench.tasks import Jitter, Tossing
 from pytest_simbench.tasks.tossing import off
 from tests.conftest import case_of, measured
@@ -54,6 +54,16 @@ def test_a_motion_that_is_the_real_one_is_not_off_and_one_beside_it_by_as_much()
         distance, angle = off(toss, toss.time, states)
         assert distance == pytest.approx(np.full(30, shift), abs=1e-12)
         assert angle == pytest.approx(np.full(30, turn), abs=1e-7)
+
+
+def test_what_is_no_choice_of_tosses_is_refused() -> None:
+    for wrong, told in (
+        ({"half": "both"}, "the half of cube_tosses is 'both'; choose from held_out, chosen_on"),
+        ({"most": -1}, "`most` of cube_tosses is -1; it must be a number from 1"),
+        ({"most": 2.5}, "`most` of cube_tosses is 2.5; it must be a whole number"),
+    ):
+        with pytest.raises(SceneError, match=told):
+            Tossing(FLIGHTS, **wrong)  # type: ignore[arg-type]
 
 
 def test_samples_are_taken_between_steps_and_the_last_state_holds() -> None:
