@@ -236,7 +236,10 @@ class ReadBack(readback.ReadBack):
         types, affinities = model.geom_contype, model.geom_conaffinity
         kinds = types[a, None] & affinities[b] | affinities[a, None] & types[b]
         excluded = (low << 16) + high in model.exclude_signature
-        return kinds * (not excluded and not self.off & {"CONTACT", "CONSTRAINT"})
+        ends = np.sort([model.pair_geom1, model.pair_geom2], axis=0)
+        places = np.minimum.outer(a, b), np.maximum.outer(a, b)
+        paired = np.isin(places[0] * model.ngeom + places[1], ends[0] * model.ngeom + ends[1])
+        return (kinds * (not excluded) | paired) * (not self.off & {"CONTACT", "CONSTRAINT"})
 
     def joint(self, name: str) -> dict[str, Any]:
         model, joint = self.model, self.at.joints[name]
