@@ -125,7 +125,7 @@ class SceneFiles:
             elif starts is not None:
                 rows = read_starts(self.request.path.parent / starts, scene)
             scene = replace(scene, starts=rows)
-            if (different := distinct(rows)) < len(rows):
+            if (different := distinct(rows, scene)) < len(rows):
                 self.tell(
                     f"{starts}: {len(rows)} starts, and {different} different in how the bodies "
                     f"lie to each other: as evidence they count as {different}"

@@ -14,7 +14,7 @@ from pytest_simbench.description.mjcf_check import check_mjcf
 from pytest_simbench.description.starts import distinct, read_starts
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.report.model.carried import sections
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.scene import Box, Pose, Scene, Start
 
 ACCOUNT = (
     Carried("option gravity", "carried", "0 0 -9.81"),
@@ -195,8 +195,18 @@ def test_equal_starts_elsewhere_on_the_table_are_one(tmp_path: Path) -> None:
     np.savez(tmp_path / "starts.npz", a=a, b=b)
     starts = read_starts(tmp_path / "starts.npz", SCENE)
     assert [start.poses[1].position for start in starts] == [(0, 0, 2), (0.5, 0, 2), (0, 0.1, 2)]
-    assert distinct(starts) == 2
-    assert distinct(starts[:2]) == 1
+    assert distinct(starts, SCENE) == 2
+    assert distinct(starts[:2], SCENE) == 1
+
+
+def test_starts_differ_from_what_they_leave_and_in_what_drives_are_told(tmp_path: Path) -> None:
+    """Three places of one body beside another that stays counted as one."""
+    np.savez(tmp_path / "starts.npz", a=rows((0, 0, 1), (0.5, 0, 1), (0, 0, 1)))
+    assert distinct(read_starts(tmp_path / "starts.npz", SCENE), SCENE) == 2
+    told = [
+        Start((), (), (0.1,), (to,), speeds) for to, speeds in ((0.1, ()), (0.2, ()), (0.1, (1.0,)))
+    ]
+    assert distinct([*told, Start((), (), (0.1,))], SCENE) == 3
 
 
 @pytest.mark.parametrize(
