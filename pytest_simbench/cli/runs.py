@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pytest_simbench.cli.values import BadInput, refusing
+from pytest_simbench.description.carried import keep, kept
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.ground.text import for_terminal, in_one_line
 from pytest_simbench.measure.settling import TASK as SETTLING
@@ -133,6 +134,9 @@ def merge_runs(
     with closing(_locked(output)) as folder:
         for task in merged.tasks.values():
             folder.describe(task)
+        for part in folders.values():
+            for name, account in kept(part.path).items():
+                keep(folder.path, Path(name), account)
         refused = _copy(records, folders, folder)
         unsaved = folder.flush()
         found, wrong = _outcome(folders, readings)

@@ -95,16 +95,23 @@ def kept(folder: Path) -> Accounts:
     return {title: tuple(account) for title, account in accounts.items()}
 
 
-def keep(folder: Path, title: str, account: Sequence[Carried]) -> None:
-    """Write the account of a file into a run folder, beside those of others."""
-    before = kept(folder)
+def keep(folder: Path, file: Path, account: Sequence[Carried]) -> str:
+    """Write the account of a file into a run folder, beside those of others.
+
+    Returns:
+        What it is called there: the file's name, with its folder's where another one has that name.
+    """
+    before, title = kept(folder), file.name
+    if before.get(title, tuple(account)) != tuple(account):
+        title = f"{file.absolute().parent.name}/{title}"
     every = before | {title: tuple(account)}
     if every == before:
-        return
+        return title
     rows = [{"file": name, **line.to_wire()} for name, told in every.items() for line in told]
     write_whole(folder, LINES, "".join(json.dumps(row) + "\n" for row in rows).encode())
     pages = (markdown(name, told) for name, told in every.items())
     write_whole(folder, PAGE, "\n".join(pages).encode())
+    return title
 
 
 def _line(data: dict[str, Any], where: str) -> tuple[str, Carried]:

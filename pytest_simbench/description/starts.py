@@ -60,18 +60,23 @@ def read_starts(path: str | Path, scene: Scene) -> tuple[Start, ...]:
     )
 
 
-def distinct(starts: Sequence[Start], tolerance: float = 1e-6) -> int:
-    """How many of the starts are different, in joints and seen from the first body of each.
+def distinct(starts: Sequence[Start], scene: Scene, tolerance: float = 1e-6) -> int:
+    """How many of the starts are different: in joints, in what their drives are told, and in the
+    free bodies, those that no start moves too, seen from the first of them.
 
     Starts that place the same things alike elsewhere on a table are one experiment, done again.
     Positions [m] and quaternions are the same up to `tolerance`.
     """
+    still = {body.name: body.pose for body in scene.free_bodies}
     seen: list[FloatArray] = []
     for start in starts:
-        first, *others = start.poses or (Pose(),)
+        places = still | dict(zip(start.bodies, start.poses, strict=True))
+        first, *others = places.values() or [Pose()]
         rows = np.array([(first.inverse() * pose).as_array() for pose in others]).reshape(-1, 7)
         rows[rows[:, 3] < 0, 3:] *= -1
-        found = np.array([*rows.ravel(), *start.positions])
+        joints = start.positions, start.targets or start.positions, start.speeds, start.efforts
+        none = (0.0,) * len(start.positions)
+        found = np.array([*rows.ravel(), *(value for each in joints for value in each or none)])
         if not any(np.allclose(found, known, atol=tolerance) for known in seen):
             seen.append(found)
     return len(seen)

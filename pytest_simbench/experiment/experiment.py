@@ -64,17 +64,13 @@ class Experiment:
     @property
     def sole(self) -> bool:
         """Whether one repetition is all there is: others would be the same."""
-        return self.case.deterministic and not self.task.draws
+        return self.most == 1
 
     @property
     def most(self) -> int | None:
-        """How many there can be before one is the copy of another: one of a task that draws
-        nothing, else one for each measured motion; None where chance makes each another."""
-        if not self.case.deterministic:
-            return None
-        if self.sole:
-            return 1
-        return self.task.repetitions if self.task.sample(self.case.seed) else None
+        """How many there can be before one is the copy of another; None where chance makes each
+        another."""
+        return self.task.different if self.case.deterministic else None
 
     def repetitions(self, asked: int | None) -> int:
         """How many there are to be: what is asked for, else what the task or the protocol has; none

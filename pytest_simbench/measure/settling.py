@@ -138,12 +138,17 @@ class Settled:
 
 
 def settlings(records: Iterable[Record]) -> list[Settled]:
-    """The scenes of a run that were left to themselves in two simulators at least, or moved."""
+    """The scenes of a run that were left to themselves in two simulators at least, or moved; those
+    of one name have the name of their test, too."""
     own = [record for record in settled(records) if record.task == TASK]
+    scenes = [(s[0], made) for s in grouped(own, _scene).values() if (made := _settled(s))]
+    names = [made.scene for _, made in scenes]
     found = []
-    for scene in grouped(own, _scene).values():
-        if made := _settled(scene):
-            found.append(made)
+    for first, made in scenes:
+        if names.count(made.scene) > 1:
+            test = f"{first.function.rpartition('::')[2]} {first.variant}".rstrip()
+            made = replace(made, scene=f"{made.scene} ({test})")
+        found.append(made)
     return found
 
 

@@ -125,18 +125,19 @@ class SceneFiles:
             elif starts is not None:
                 rows = read_starts(self.request.path.parent / starts, scene)
             scene = replace(scene, starts=rows)
-            if (different := distinct(rows)) < len(rows):
+            if (different := distinct(rows, scene)) < len(rows):
                 self.tell(
                     f"{starts}: {len(rows)} starts, and {different} different in how the bodies "
                     f"lie to each other: as evidence they count as {different}"
                 )
+        title = at.name
         try:
-            keep(self.folder, at.name, found.account)
+            title = keep(self.folder, at, found.account)
         except OSError as error:
             lost = f"{self.folder / PAGE} could not be written ({error.strerror or error})"
             self.tell(lost, unwritten=True)
         for line in terminal_lines(found.account):
-            self.tell(f"{at.name}: {line} ({PAGE})")
+            self.tell(f"{title}: {line} ({PAGE})")
         return scene
 
 

@@ -112,6 +112,12 @@ class Task(ABC):
         """How many there are to be where nobody says; None: as many as the protocol has."""
         return None
 
+    @property
+    def different(self) -> int | None:
+        """How many a simulator that is deterministic does before one is the copy of another; None:
+        each seed is another."""
+        return None if self.draws else 1
+
     def sample(self, seed: int) -> tuple[str, int] | None:
         """The data set and the number in it of the measured motion that the repetition of a seed is
         held against, if it is."""

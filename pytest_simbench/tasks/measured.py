@@ -50,6 +50,8 @@ class MeasuredTask(Task, Generic[M]):
         """Each motion once."""
         return len(self.chosen)
 
+    different = repetitions
+
     def smoke(self) -> Self:
         return replace(self, most=self.smallest) if self.smallest else self  # type: ignore[type-var]
 

@@ -48,6 +48,11 @@ class OnScene(Task):
         """That repetitions go through."""
         return self.world.starts
 
+    @property
+    def different(self) -> int | None:
+        """Each start once."""
+        return max(1, len(self.starts))
+
     def start(self, seed: int) -> Start | None:
         """Where a repetition starts; None: as the scene is written."""
         return self.starts[seed % len(self.starts)] if self.starts else None

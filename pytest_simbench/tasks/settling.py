@@ -87,6 +87,10 @@ class Settling(OnScene):
                     )
 
     @property
+    def different(self) -> int | None:
+        return None if self.moved else super().different
+
+    @property
     def metrics(self) -> tuple[Metric, ...]:
         told = "; ".join(map(str, self.premises))
         return (

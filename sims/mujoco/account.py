@@ -166,7 +166,7 @@ def tell_the_rest(reading: Reading) -> None:
 
 
 def _tell_shapes(reading: Reading) -> None:
-    model, scene = reading.model, reading.scene
+    scene = reading.scene
     reading.tell("body mass, inertia, pos, quat", CARRIED, "as compiled, in full digits")
     reading.tell("geom type, size, pos, quat", CARRIED, f"{len(reading.solid)} shapes that collide")
     reading.tell("option gravity", CARRIED, f"{values_of(np.array([scene.gravity]))} m/s^2")
@@ -176,9 +176,8 @@ def _tell_shapes(reading: Reading) -> None:
         f"{values_of(np.array(sorted(scene.frictions)))}; of two surfaces the larger counts, "
         "where the run tells no other",
     )
-    masks = np.stack([model.geom_contype, model.geom_conaffinity], axis=1)
-    if seen := np.flatnonzero(~masks.any(axis=1)).tolist():
-        names = (reading.name("geom", geom) for geom in seen)
+    if reading.seen:
+        names = (reading.name("geom", geom) for geom in reading.seen)
         reading.tell("geom (visual)", NOT_CARRIED, "it cannot collide; its mass counts", names)
 
 

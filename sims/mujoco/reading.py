@@ -58,6 +58,7 @@ class Reading:
         spec: what the file says; None: it is read.
 
     Attributes:
+        solid, seen: numbers of the shapes that collide, but for planes; of those that cannot.
         ground: number of the plane that is the ground; None: the file has none.
         falls: whether gravity acts.
         soft: numbers of the bodies that are points of what is soft, and nothing else.
@@ -80,7 +81,8 @@ class Reading:
         off = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
         self.falls = bool(model.opt.gravity.any() and not off)
         masks = model.geom_contype | model.geom_conaffinity
-        self.solid = np.flatnonzero(masks).tolist()
+        masks[[*model.pair_geom1, *model.pair_geom2]] = 1  # whatever their masks, pairs collide
+        self.solid, self.seen = (np.flatnonzero(found).tolist() for found in (masks, masks == 0))
         if len(self.solid) > MOST_SHAPES:
             told = f"{len(self.solid)} shapes collide, and {MOST_SHAPES} can; leave out some"
             raise self.refuse(told)

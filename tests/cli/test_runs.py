@@ -13,6 +13,7 @@ import pytest
 
 from pytest_simbench.cli.runs import merge_runs, report_runs, sections
 from pytest_simbench.cli.values import BadInput
+from pytest_simbench.description.carried import Carried, keep, kept
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.folder import RunContents, RunFolder
@@ -68,6 +69,16 @@ def test_logs_and_traces_are_copied_under_names_of_ours(here: Path) -> None:
     for folder, ending in (("traces", ".npz"), ("videos", ".mp4")):
         copies = [Path(log.replace("logs", folder)).with_suffix(ending) for log in logs]
         assert [(whole / copy).read_text()[-4:] for copy in copies] == ["of a", "of b"]
+
+
+def test_a_whole_tells_what_was_carried_of_the_scenes_of_its_parts(here: Path) -> None:
+    told = Carried("geom margin", "not carried", "why"), Carried("geom gap", "not carried", "why")
+    for seed, (name, account) in enumerate({"a": told, "b": told[:1], "c": told}.items(), 1):
+        saved(here / name, seed, "")
+        keep(here / name, here / name / "scene.xml", account)
+    assert merge("a", "b", "c") == 0
+    assert [*kept(here / "whole").values()] == [told, told[:1]]
+    assert "What was carried of scene.xml" in (here / "whole/report.html").read_text()
 
 
 def test_claims_of_parts_are_not_those_of_the_whole(

@@ -14,7 +14,7 @@ from pytest_simbench.description.mjcf_check import check_mjcf
 from pytest_simbench.description.starts import distinct, read_starts
 from pytest_simbench.ground.errors import DescriptionError
 from pytest_simbench.report.model.carried import sections
-from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.scene import Box, Pose, Scene, Start
 
 ACCOUNT = (
     Carried("option gravity", "carried", "0 0 -9.81"),
@@ -168,22 +168,25 @@ def rows(*places: tuple[float, float, float]) -> np.ndarray:
 
 
 def test_accounts_of_several_files_stand_side_by_side(tmp_path: Path) -> None:
-    keep(tmp_path, "a.xml", ACCOUNT[:1])
-    keep(tmp_path, "b.xml", ACCOUNT)
-    keep(tmp_path, "a.xml", ACCOUNT[1:])
-    assert kept(tmp_path) == {"a.xml": tuple(ACCOUNT[1:]), "b.xml": tuple(ACCOUNT)}
-    page = (tmp_path / "carried.md").read_text()
-    assert page == f"{markdown('a.xml', ACCOUNT[1:])}\n{markdown('b.xml', ACCOUNT)}"
-    shown = sections(tmp_path)
-    assert [section.title for section in shown] == [
-        "What was carried of a.xml", "What was carried of b.xml",
+    """Of two called alike the second stood in the place of the first."""
+    told = [
+        keep(tmp_path, tmp_path / name, account)
+        for name, account in (("a.xml", ACCOUNT[1:]), ("b.xml", ACCOUNT), ("b/a.xml", ACCOUNT[:1]),
+                              ("a.xml", ACCOUNT[1:]))
     ]  # fmt: skip
+    assert told == ["a.xml", "b.xml", "b/a.xml", "a.xml"]
+    each = {"a.xml": ACCOUNT[1:], "b.xml": ACCOUNT, "b/a.xml": ACCOUNT[:1]}
+    assert kept(tmp_path) == each
+    page = (tmp_path / "carried.md").read_text()
+    assert page == "\n".join(markdown(*told) for told in each.items())
+    shown = sections(tmp_path)
+    assert [section.title for section in shown] == [f"What was carried of {name}" for name in each]
     assert len(shown[1].tables[0].columns[0].cells) == len(ACCOUNT)
 
 
 @pytest.mark.parametrize("line", ['{"file": 1}', '{"x": "y"}', '{"state": "odd"}', "[]", "x"])
 def test_lines_that_are_no_account_are_passed_over(tmp_path: Path, line: str) -> None:
-    keep(tmp_path, "a.xml", ACCOUNT)
+    keep(tmp_path, Path("a.xml"), ACCOUNT)
     with (tmp_path / "carried.jsonl").open("a") as file:
         file.write(line + "\n")
     assert kept(tmp_path) == {"a.xml": tuple(ACCOUNT)}
@@ -195,8 +198,18 @@ def test_equal_starts_elsewhere_on_the_table_are_one(tmp_path: Path) -> None:
     np.savez(tmp_path / "starts.npz", a=a, b=b)
     starts = read_starts(tmp_path / "starts.npz", SCENE)
     assert [start.poses[1].position for start in starts] == [(0, 0, 2), (0.5, 0, 2), (0, 0.1, 2)]
-    assert distinct(starts) == 2
-    assert distinct(starts[:2]) == 1
+    assert distinct(starts, SCENE) == 2
+    assert distinct(starts[:2], SCENE) == 1
+
+
+def test_starts_differ_from_what_they_leave_and_in_what_drives_are_told(tmp_path: Path) -> None:
+    """Three places of one body beside another that stays counted as one."""
+    np.savez(tmp_path / "starts.npz", a=rows((0, 0, 1), (0.5, 0, 1), (0, 0, 1)))
+    assert distinct(read_starts(tmp_path / "starts.npz", SCENE), SCENE) == 2
+    told = [
+        Start((), (), (0.1,), (to,), speeds) for to, speeds in ((0.1, ()), (0.2, ()), (0.1, (1.0,)))
+    ]
+    assert distinct([*told, Start((), (), (0.1,))], SCENE) == 3
 
 
 @pytest.mark.parametrize(

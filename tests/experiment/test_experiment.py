@@ -88,10 +88,7 @@ def test_what_draws_nothing_is_done_once_where_it_would_be_the_same(
 
 def test_measured_motions_are_not_repeated_where_that_would_copy_them(case: Case) -> None:
     class Three(Falling):
-        repetitions = 3
-
-        def sample(self, seed: int) -> tuple[str, int]:
-            return "tosses", seed % 3
+        repetitions = different = 3
 
     for deterministic, most in ((True, 3), (False, 20)):
         experiment = Experiment(replace(case, deterministic=deterministic), Three())

@@ -170,7 +170,10 @@ def test_a_crash_is_told_and_other_scenes_stay_apart() -> None:
     assert told[:3] == [["a", "b"], ["100 %", "ended"], ["100 % 1.3 1 crashed", "-"]]
     for key in ("task.scene", "task.scene_digest", "task.seconds", "task.starts"):
         other = {"settings": {**end("a", 0).settings, key: 3}}
-        assert len(settlings([*records[1:3], *(end(who, 3.0, **other) for who in "ab")])) == 2
+        more = [end(who, 3.0, **other, test=f"x.py::test_x[{who}-headless-b]") for who in "ab"]
+        found = [one.scene for one in settlings([*records[1:3], *more])]
+        named = ["bowl (test_scene)", "bowl (test_x b)"]  # both were called "bowl"
+        assert found == (["bowl", "3"] if key == "task.scene" else named)
 
 
 def test_each_configuration_has_ends_of_its_own() -> None:

@@ -136,9 +136,10 @@ def test_starts_are_where_the_file_has_them_though_its_ground_is_elsewhere(
     )
     ends = [r["details"]["places"]["upper"] for r in records(pytester.path / "run")]
     assert sorted(end[0] for end in ends) == pytest.approx(
-        [0.3, 0.3, 0.4, 0.4, 0.5, 0.5, 0.5, 0.5], abs=1e-3
+        [0.3, 0.3, 0.4, 0.4, 0.5, 0.5],
+        abs=1e-3,  # MuJoCo does the one stored start once
     )
-    assert [end[2] for end in ends] == pytest.approx([0.25] * 8, abs=1e-3)
+    assert [end[2] for end in ends] == pytest.approx([0.25] * 6, abs=1e-3)
     assert max(r["metrics"]["farthest"] for r in records(pytester.path / "run")) < 10  # [mm]
 
 

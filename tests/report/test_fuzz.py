@@ -116,7 +116,7 @@ def folder() -> Path:
     run.claim(replace(placed, simulator="drake", verdict="UNDECIDED", mean=0.9, n=3))
     run.close()
     account = [Carried("mass", "carried", "as compiled"), Carried("tendon", "not carried", "no")]
-    keep(path, "scene.xml", account)
+    keep(path, Path("scene.xml"), account)
     for line in (LINE, REPLAY):
         repeatability.append(path, line)
     write_outcome(path, RunOutcome(False, ("before", compared())))

@@ -149,7 +149,7 @@ def test_few_repetitions_give_no_false_confidence_and_interrupted_ones_are_named
     report = render_task(summary, 100)
     assert "placed: mujoco 93 % [2, 100]." in report
     assert "at the end: mujoco 100 % [2, 100]." in report
-    assert "; of lengths, times and costs none for fewer than 5 values" in tables.LEGEND
+    assert "Lengths, times and costs have no interval for fewer than 5 values" in tables.LEGEND
     assert "0 of 1" in report
     assert "1 cut" in report
 

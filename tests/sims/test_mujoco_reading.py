@@ -253,6 +253,19 @@ def test_what_masks_and_exclusions_keep_apart(
     assert found == set(map(frozenset, pairs))
 
 
+@pytest.mark.parametrize("profile", ["tuned", "file"])
+def test_what_a_pair_names_collides_whatever_its_masks(tmp_path: Path, profile: str) -> None:
+    unmasked = [f'name="{name}" contype="0" conaffinity="0"' for name in ("g", "floor")]
+    text = SMALL.replace('name="g"', unmasked[0]).replace('name="floor"', unmasked[1])
+    named = "</worldbody><contact><pair geom1='floor' geom2='g'/></contact>"
+    reading = read(tmp_path, text.replace("</worldbody>", named))
+    apart = {frozenset(pair) for pair in reading.scene.apart}
+    box = {frozenset({"body/box", f"body/{k}"}) for k in ("post", "ball", "rock", "tool")}
+    assert apart == box | {frozenset({"ground", f"body/{k}"}) for k in ("ball", "rock", "tool")}
+    assert not reading.seen
+    check_parity(reading.scene, profile)
+
+
 @pytest.mark.parametrize("dof", ["full", "trilinear"])
 def test_bodies_of_what_is_soft_alone_are_left_out(tmp_path: Path, dof: str) -> None:
     grid = 'name="jelly" type="grid" count="3 3 3" spacing=".1 .1 .1" dim="3"'

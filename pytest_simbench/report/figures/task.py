@@ -71,7 +71,7 @@ def draw(summary: TaskSummary, name: str, *, titled: bool = True) -> Any:
 
 
 def _failed(row: Row) -> str:
-    """What a mean does not show: it is one of the repetitions that ended well."""
+    """What a mean does not show."""
     return f"\n{row.failed} of {row.failed + row.finished} crashed" if row.failed else ""
 
 

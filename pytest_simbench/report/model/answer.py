@@ -72,8 +72,9 @@ def _untold(found: Sequence[Difference]) -> str:
     undecided = [d for d in found if d.verdict == "undecided"]
     if not all(d.needs for d in undecided):
         return "not told apart"
-    needs, differ = min(d.needs for d in undecided), max(d.differ for d in undecided)
-    return f"a difference needs at least {needs} pairs that differ; so far {differ or 'none'}"
+    near = min(undecided, key=lambda d: d.needs - d.differ)  # both numbers of one pair of rows
+    told = f"a difference needs at least {near.needs} pairs that differ"
+    return f"{told}; so far {near.differ or 'none'}"
 
 
 def sentences(summary: TaskSummary) -> list[str]:

@@ -78,11 +78,13 @@ class Claims:
 @dataclass(frozen=True)
 class _Told:
     """A claim with the metric that it is about, None where that is not known, and its subject: the
-    test's function and its variant; of many variants (laws) the function alone."""
+    test's function and its variant; of many variants (laws) the function alone. `who` is the
+    simulator, with mode and profile where a run has several."""
 
     claim: Claim
     metric: Metric | None
     subject: str
+    who: str
 
     @property
     def claimed(self) -> str:
@@ -126,7 +128,9 @@ def claims_of(
     of_test = grouped(reading.records, lambda r: r.test)
     crashed = {test for test, of in of_test.items() if any(r.status == "failed" for r in of)}
     claims = _that_count(reading.claims, crashed)
-    told = [_told(claim, claims, reading.metrics) for claim in claims]
+    places = list(dict.fromkeys(map(_place, claims)))
+    who = dict(zip(places, names(places, "{} {}", " "), strict=True))
+    told = [_told(claim, claims, reading.metrics, who[_place(claim)]) for claim in claims]
     failures = comparison.failures if comparison else ()
     count = Counter[str](claim.verdict for claim in claims)
     count["FAIL"] += len(failures)
@@ -139,7 +143,7 @@ def claims_of(
     troubles = [Trouble(text) for text in failures]
     troubles += [_trouble(one, of_test.get(one.claim.test, [])) for one in fails]
     for (subject, claimed), same in grouped(undecided, lambda t: (t.subject, t.claimed)).items():
-        of = [(f"{one.claim.simulator} {one.value}".rstrip(), one.claim.advice) for one in same]
+        of = [(f"{one.who} {one.value}".rstrip() + one.without, one.claim.advice) for one in same]
         found = [f"{value} ({advice})" for value, advice in of]
         troubles.append(Trouble(f"UNDECIDED {subject}: {claimed}: {'; '.join(found)}"))
     more = max(0, len(troubles) - MOST)
@@ -147,14 +151,18 @@ def claims_of(
     return Claims(state, sentence, _table(told), troubles[:MOST], more)
 
 
-def _told(claim: Claim, claims: Sequence[Claim], metrics: Metrics) -> _Told:
+def _place(claim: Claim) -> tuple[str, str, str]:
+    return claim.simulator, claim.mode, claim.profile
+
+
+def _told(claim: Claim, claims: Sequence[Claim], metrics: Metrics, who: str) -> _Told:
     known = (*metrics.get(claim.task, ()), *COSTS, CRASHED)
     metric = next((metric for metric in known if metric.name == claim.metric), None)
     variants = {c.variant for c in claims if c.function == claim.function}
     subject = _name(claim) if len(variants) <= MOST // 3 else _function(claim)
     if any(_function(c) == _function(claim) and c.function != claim.function for c in claims):
         subject = subject.replace(_function(claim), claim.function, 1)  # of several of that name
-    return _Told(claim, metric, subject)
+    return _Told(claim, metric, subject, who)
 
 
 def _function(claim: Claim) -> str:
@@ -216,14 +224,11 @@ def _table(told: Sequence[_Told]) -> Table:
     tests in one cell are counted."""
     if not told:
         return Table("Claims", [])
-    of = [(one.claim.simulator, one.claim.mode, one.claim.profile) for one in told]
-    places = list(dict.fromkeys(of))
-    who = dict(zip(places, names(places, "{} {}", " "), strict=True))
-    failing = sorted(zip(of, told, strict=True), key=lambda pair: pair[1].claim.verdict != "FAIL")
-    rows = grouped(failing, lambda pair: (pair[1].subject, pair[1].claimed))
+    failing = sorted(told, key=lambda one: one.claim.verdict != "FAIL")
+    rows = grouped(failing, lambda one: (one.subject, one.claimed))
     found = [Column("claim", [f"{subject}: {text}" for subject, text in rows], left=True)]
-    for place, name in who.items():
-        cells = [_cell([one for at, one in row if at == place]) for row in rows.values()]
+    for name in dict.fromkeys(one.who for one in told):
+        cells = [_cell([one for one in row if one.who == name]) for row in rows.values()]
         found.append(Column(name, cells, left=True))
     return Table("Claims", found, ONE_SIDED if any("[" in one.value for one in told) else "")
 
@@ -239,7 +244,7 @@ def _cell(told: Sequence[_Told]) -> str:
 def _trouble(told: _Told, records: Sequence[Record]) -> Trouble:
     """A claim that failed, with the repetition that speaks most against it; a crashed one first."""
     claim, metric = told.claim, told.metric
-    test = f"FAIL {claim.simulator}, {_name(claim)}"
+    test = f"FAIL {told.who}, {_name(claim)}"
     crashed = [record for record in records if record.status == "failed"]
     if not claim.metric:
         worst = next(iter([*crashed, *records]), None)

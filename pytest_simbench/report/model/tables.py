@@ -12,13 +12,19 @@ from pytest_simbench.report.model.document import Cell, Column, Content, Section
 from pytest_simbench.report.model.pooling import Spread, merged_order
 from pytest_simbench.report.model.summary import PHASES, SHOWN_COSTS, Row, TaskSummary
 
+COUNTED = (
+    "A crash counts with the worst value of a share or a yes-or-no metric, but by --protocol "
+    "paper, and in nothing else. Lengths, times and costs have no interval for fewer than 5 "
+    "values, nor where all are alike. CPU in % of one core and RAM in MB: mean +- deviation of "
+    "worker and children, each repetition counting the same. x real time: simulated over wall "
+    "seconds of stepping; at full speed, compare CPU s per simulated s. Start and end of the "
+    "task: seconds from launch."
+)
+"""Of what the numbers are, in every medium."""
+
 LEGEND = (
-    "min / mean / max over the finished repetitions, [95 % interval of the mean]; of lengths, "
-    "times and costs none for fewer than 5 values, nor where all are alike. CPU in % of one core "
-    "and RAM in MB: mean +- deviation of worker and children, each repetition counting the same. "
-    "x real time: simulated over wall seconds of stepping; at full speed, compare CPU s per "
-    "simulated s. Start and end of the task: seconds from launch. Rows beat each other or differ "
-    "where that is 95 % certain of all outcomes together, or of all costs."
+    f"min / mean / max over the repetitions, [95 % interval of the mean]. {COUNTED} Rows beat each "
+    "other or differ where that is 95 % certain of all outcomes together, or of all costs."
 )
 """How to read the tables, in one paragraph."""
 

@@ -18,6 +18,7 @@ from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.measure.watching import Step
 from pytest_simbench.report.model import watched
 from pytest_simbench.report.model.document import Cell, Section, Table, capital
+from pytest_simbench.report.model.tables import COUNTED
 from pytest_simbench.report.page.context import Shown
 
 _LOG = re.compile(r"logs/[A-Za-z0-9_=-][A-Za-z0-9_.=-]*\.log")
@@ -77,6 +78,7 @@ def _template(name: str) -> Template:
         rows=_rows,
         svg=lambda picture: Markup(picture.svg),
         log_link=lambda log: log if _LOG.fullmatch(log) else "",
+        counted=COUNTED,
         version=__version__,
     )
     return environment.get_template(name)

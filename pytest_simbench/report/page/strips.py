@@ -16,7 +16,7 @@ from pytest_simbench.ground.text import for_figure
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record, Who
 from pytest_simbench.report.model import cells
-from pytest_simbench.report.model.pooling import COST
+from pytest_simbench.report.model.pooling import COST, spread
 from pytest_simbench.report.model.summary import Row, TaskSummary
 
 HEIGHT = 36
@@ -134,9 +134,9 @@ def _strip(metric: Metric, summary: TaskSummary, number: Callable[[Record], int]
         there = [(r, v) for r, v in found if v is not None]
         drawn = _some(there, by=lambda item: item[1])
         lost = _some([r for r, v in found if v is None])
-        mean = sum(v for _, v in there) / len(there) if there else None
-        pooled = None if cost else row.metrics.get(metric.name)
-        ends = (mean, pooled.low, pooled.high) if pooled else (mean, None, None)
+        pooled = None if cost else row.metrics.get(metric.name)  # with crashes, as in the tables
+        pooled = pooled or spread([v for _, v in there])
+        ends = (pooled.mean, pooled.low, pooled.high) if pooled else (None, None, None)
         bar, low_end, high_end = (None if end is None else scale(end) for end in ends)
         count = len(drawn) + len(lost)
         return StripLine(

@@ -72,6 +72,15 @@ def test_a_task_that_is_not_told_apart_says_what_it_takes() -> None:
     assert headline([]) == []
 
 
+def test_what_it_takes_and_what_there_is_are_of_the_same_rows() -> None:
+    """ "needs at least 6; so far 6", it said, of rows that crashed often beside others."""
+    found = task({"a": 0.2, "b": 0.8, "c": 0.9})
+    first, *others = found.differences
+    rare = [replace(other, differ=3, needs=6) for other in others]
+    found = replace(found, differences=(replace(first, differ=6, needs=7), *rare))
+    assert sentences(found)[0].endswith("needs at least 7 pairs that differ; so far 6.")
+
+
 def test_without_differences_there_is_no_matrix() -> None:
     same = [record(name, k, metrics={"placed": 1.0}) for name in ("a", "b") for k in range(20)]
     assert tables.matrix(summarise(same, METRICS)[0]) == []

@@ -216,3 +216,13 @@ def test_a_claim_that_is_not_decided_on_several_simulators_is_told_once() -> Non
         "UNDECIDED test_stacking: placed >= 90 %: mujoco 90 (about 9 more repetitions needed); "
         "sapien 90 (about 9 more repetitions needed)"
     )
+
+
+def test_modes_and_missing_values_are_in_what_is_told_of_a_claim() -> None:
+    """Both lines said "mujoco", and of repetitions that gave no value that they were too few."""
+    open_ = claim(verdict="UNDECIDED", advice="needs 5", mean=0.9, n=3, without=4)
+    fail = claim(verdict="FAIL", test="x.py::test_stacking[mujoco-gui]", mode="gui", mean=0.5)
+    found = claims_of(reading(open_, fail))
+    fails, undecided = (trouble.what for trouble in found.troubles)
+    assert fails.startswith("FAIL mujoco gui, test_stacking: ")
+    assert undecided.endswith(": mujoco headless 90, 4 without a value (needs 5)")

@@ -179,6 +179,13 @@ def test_shares_lie_between_nothing_and_all() -> None:
     assert line.low < line.mean < line.high <= RIGHT
 
 
+def test_the_bar_is_the_mean_of_the_tables_with_the_crashed_ones() -> None:
+    (summary,) = summarise(stacking_run(), METRICS)
+    for row, line in zip(summary.rows, plots(stacking_run())["placed %"].lines, strict=True):
+        mean = row.metrics["placed"].mean
+        assert line.mean == pytest.approx(LEFT + (RIGHT - LEFT) * mean, abs=0.01)
+
+
 def test_values_keep_their_order_and_the_reference_has_its_place() -> None:
     plot = plots(throwing_run())["landing x m"]
     assert max(dot.x for dot in plot.lines[1].dots) < plot.reference
