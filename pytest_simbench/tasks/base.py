@@ -87,8 +87,8 @@ class Task(ABC):
         references: metric name to the value of a perfect simulator, where there is one.
         counted: what progress counts: "cubes placed" shows as `4/15 cubes placed`.
         moments: where replays save and restore, and until which a disturbance is followed.
-        draws: whether seed and jitter change anything. If not, a simulator that is deterministic
-            does it once, however many repetitions are asked for.
+        draws: whether seed and jitter change anything but which start it is. If not, a simulator
+            that is deterministic does it once, however many repetitions are asked for.
         shares_worker: it takes less time than the start of a worker, so one serves several tests.
         pictured: phases within which the task notes moments (`World.note`); pictures show them.
     """

@@ -36,6 +36,7 @@ class Fitting(OnScene):
     """
 
     name: ClassVar[str] = "fitting"
+    draws: ClassVar[bool] = False
 
     log: Log
     values: Mapping[str, float] = field(default_factory=dict)

@@ -30,6 +30,7 @@ class Holding(OnJoints):
     """
 
     name: ClassVar[str] = "holding"
+    draws: ClassVar[bool] = False
 
     seconds: float = 2.5
 

@@ -50,8 +50,8 @@ class OnScene(Task):
 
     @property
     def different(self) -> int | None:
-        """Each start once."""
-        return max(1, len(self.starts))
+        """Each start once, of a task that draws nothing else."""
+        return None if self.draws else max(1, len(self.starts))
 
     def start(self, seed: int) -> Start | None:
         """Where a repetition starts; None: as the scene is written."""

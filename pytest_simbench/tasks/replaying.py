@@ -55,6 +55,7 @@ class Replaying(OnJoints):
     """
 
     name: ClassVar[str] = "replaying"
+    draws: ClassVar[bool] = False
 
     log: Log
 

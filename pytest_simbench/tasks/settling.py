@@ -64,6 +64,7 @@ class Settling(OnScene):
     """
 
     name: ClassVar[str] = "settling"
+    draws: ClassVar[bool] = False
     references: ClassVar[Mapping[str, float]] = {"premises": 1.0}
 
     premises: Sequence[RestsOn] = ()

@@ -47,12 +47,17 @@ def test_the_deepest_overlap_is_that_of_bodies_or_of_the_ground() -> None:
     assert deepest(apart, sunk) == deepest(apart, lower) == 0.0
 
 
+class Drawing(Settling):
+    draws = True
+
+
 def test_as_many_repetitions_differ_as_there_are_starts_unless_they_are_moved() -> None:
     """A deterministic simulator made 20 copies of one, and they proved 83 %."""
     starts = tuple(Start(("slab",), (Pose.at(x, 0, 0.05),)) for x in (0.0, 0.1, 0.2))
     for scene, different in ((SCENE, 1), (replace(SCENE, starts=starts), 3)):
         assert Settling(scene).different == different
         assert Settling(scene, moved=0.001).different is None
+        assert Drawing(scene).different is None  # somebody's own may draw by the seed
 
 
 def test_starts_are_moved_on_request_alone_and_by_the_seed() -> None:
