@@ -303,7 +303,8 @@ class Run:
         before = self.resumed.records if self.resumed else ()
         looks, cut = looks_at(path, before, records), cut_at(path, before, records, self.judged)
         passed = passed and not self.failing
-        outcome = RunOutcome(passed, found, looks, cut=cut)
+        ended = not (passed and cut)  # else a test that was cut short has still to be judged
+        outcome = RunOutcome(passed if ended else None, found, looks, ended, cut)
         written = write_files(path, Report.of(self.reading, outcome))
         unsaved = self.folder.flush()
         problems = [*self.told, *self.reading.problems, *self.reading.refused]
@@ -322,7 +323,7 @@ class Run:
             reporter.write_line(text)
         lost = [write_outcome(path, outcome)]
         if badge := options.value(self.config, "sim_badge"):
-            lost.append(write_badge(Path(badge), records, passed, self.reading.claims))
+            lost.append(write_badge(Path(badge), records, outcome.passed, self.reading.claims))
         whole = written.complete and made[1] and not unsaved
         self.unwritten = not whole or any([*lost, *self.told.values()])
         problems += [*lost, *made[0]]

@@ -151,6 +151,15 @@ def test_one_that_is_cut_and_completed() -> None:
     assert_approved("run-cut", text)
 
 
+def test_one_that_is_cut_and_completed_in_part_has_not_passed() -> None:
+    run("--sim-output=cut -k high", cut=4)
+    text = run("--sim-resume=cut -k low")
+    assert "exit code 0" in text
+    assert "UNDECIDED   1 of 1 claims hold; the run did not end: resume it; 0 of 11" in text
+    assert '"message": "mujoco: 11 repetitions, not judged", "color": "lightgrey"' in text
+    assert '"color": "brightgreen"' in run("--sim-resume=cut -k high")
+
+
 def test_one_whose_page_cannot_be_written() -> None:
     Path("out/report.html").mkdir(parents=True)
     assert_approved("run-unwritten", run("--sim-output=out -k low"))
