@@ -14,12 +14,16 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.tasks.base import Task
+from pytest_simbench.tasks.source import is_own, package
 
 KEPT = list, dict, set, deque
 """What a policy changes in place while it acts."""
 
 CODE = FunctionType, MethodType, partial
 """What holds such things without being one: functions enclose them, methods are bound to them."""
+
+BASES = {"abc", "builtins", "pytest_simbench", "typing"}
+"""Packages whose classes an object of the user's may inherit from; else it may be a network."""
 
 Known = dict[int, Any]
 """What is copied already, by the identity of what it is a copy of, as of `deepcopy`."""
@@ -39,8 +43,8 @@ def own(task: Task) -> Task:
 
 
 def _copied(policy: Any, known: Known) -> Any:
-    """With arrays, lists and dicts of its own; a network, or what cannot be copied, is shared, and
-    so are arrays of which one is a view of another."""
+    """With objects of the user's classes, arrays, lists and dicts of its own; a network, or what
+    cannot be copied, is shared, and so are arrays of which one is a view of another."""
     if id(policy) in known:
         return known[id(policy)]
     if isinstance(policy, MethodType):
@@ -85,8 +89,15 @@ def _held(values: Iterable[Any], known: Known) -> list[Any]:
     linked = any(one.base is other for one in arrays for other in arrays)
     for k, value in enumerate(found):
         with suppress(Exception):
-            if isinstance(value, CODE):
+            if isinstance(value, CODE) or _users(type(value)):
                 found[k] = _copied(value, known)
             elif isinstance(value, KEPT if linked else (*KEPT, np.ndarray)):
                 found[k] = deepcopy(value, known)
     return found
+
+
+def _users(kind: type) -> bool:
+    """Whether a class is the user's, and so is what it inherits: a filter, a controller. What ends
+    something when it is deleted, a connection, is not copied."""
+    bases = (is_own(base) or package(base) in BASES for base in kind.__mro__)
+    return is_own(kind) and all(bases) and not hasattr(kind, "__del__")

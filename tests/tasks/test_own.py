@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -64,17 +65,50 @@ def test_it_begins_anew(policy: Any) -> None:
         assert [mine.act(0), mine.act(0)] == [1, 2]
 
 
+class Counter:
+    def __init__(self, **held: Any) -> None:
+        self.asked = 0
+        vars(self).update(held)
+
+    def __call__(self, seen: Any) -> int:
+        self.asked += 1
+        return self.asked
+
+
+@pytest.mark.parametrize("deep", [False, True])
+def test_an_object_of_the_user_s_begins_anew_too(deep: bool) -> None:
+    """Repetitions side by side went through one filter."""
+    counter = Counter(within=Counter())
+    policy = Object(count=counter, act=lambda seen: (counter.within if deep else counter)(seen))
+    task = Reaching(policy)
+    for _ in range(2):
+        mine = own(task).policy
+        assert [mine.act(0), mine.act(0)] == [1, 2]
+        assert mine.count.asked == 2 * (not deep)  # the same one
+    assert (counter.asked, counter.within.asked) == (0, 0)
+
+
 class Uncopied(Object):
     def __reduce_ex__(self, protocol: Any) -> Any:
         raise TypeError
 
 
-def test_networks_and_what_cannot_be_copied_are_shared() -> None:
-    network = Uncopied()
+class Connection(Counter):
+    def __del__(self) -> None:
+        """Ends it."""
+
+
+class Network(Counter, Namespace):
+    """A part of its class is installed."""
+
+
+@pytest.mark.parametrize("kind", [Uncopied, Connection, Network])
+def test_networks_and_what_cannot_be_copied_are_shared(kind: type[Any]) -> None:
+    network = kind()
     for policy in (lambda seen: network, partial(lambda held, seen: held, network)):
         assert own(Reaching(policy)).policy(0) is network
     assert own(Reaching(Object(network=network))).policy.network is network
-    assert own(Reaching(network)).policy is network
+    assert (own(Reaching(network)).policy is network) == (kind is Uncopied)
 
 
 class Own(Reaching):
