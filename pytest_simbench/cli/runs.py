@@ -21,6 +21,7 @@ from pytest_simbench.description.carried import keep, kept
 from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.ground.text import for_terminal, in_one_line
 from pytest_simbench.measure.settling import TASK as SETTLING
+from pytest_simbench.records import repeatability
 from pytest_simbench.records.folder import RECORDS, TASKS, RunContents, RunFolder
 from pytest_simbench.records.merging import Merged, MergeError, merge, merge_tasks
 from pytest_simbench.records.paths import FolderError, new_name, opened, whole
@@ -90,6 +91,8 @@ def _outcome(folders: Folders, readings: dict[str, RunContents]) -> tuple[RunOut
     outcomes = [outcome for outcome, _ in found]
     if len(outcomes) == 1:
         return outcomes[0], wrong
+    apart = (name for name, of in folders.items() if (of.path / repeatability.NAME).exists())
+    wrong += [f"{name}: results on repeatability are not joined; they stay there" for name in apart]
     passed = [outcome.passed for outcome in outcomes]
     unknown = None in passed or any(reading.claims for reading in readings.values())
     together = False if False in passed else None if unknown else True

@@ -80,6 +80,17 @@ def test_a_whole_tells_what_was_carried_of_the_scenes_of_its_parts(here: Path) -
     assert "What was carried of scene.xml" in (here / "whole/report.html").read_text()
 
 
+def test_results_on_repeatability_that_stay_with_a_part_are_told(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, seed in (("a", 1), ("b", 2)):
+        saved(here / name, seed, "")
+    (here / "b" / "repeatability.jsonl").touch()
+    assert merge("a", "b") == 0
+    (told,) = (line for line in capsys.readouterr().out.splitlines() if "repeatability" in line)
+    assert told == "b: results on repeatability are not joined; they stay there"
+
+
 def test_claims_of_parts_are_not_those_of_the_whole(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
