@@ -195,6 +195,16 @@ def test_values_keep_their_order_and_the_reference_has_its_place() -> None:
     assert [dot.x for dot in plot.lines[1].lost] == [LOST]
 
 
+def test_rounding_is_not_drawn_as_a_spread() -> None:
+    """Nanometres went from one end to the other, above five ticks that all said 0."""
+    records = [
+        record(repetition=k, task="throwing", metrics={"landing_error": 1e-9 * k}) for k in range(9)
+    ]
+    plot = plots(records)["landing error m"]
+    assert {dot.x for dot in plot.lines[0].dots} == {LEFT}
+    assert [text for _, text in plot.ticks] == ["0", "0.00025", "0.0005", "0.00075", "0.001"]
+
+
 def test_costs_that_differ_widely_are_logarithmic() -> None:
     def of(most: float) -> Strip:
         records = [
