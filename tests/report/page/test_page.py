@@ -119,6 +119,20 @@ def test_the_setup_tells_settings_versions_and_machines() -> None:
     assert setup(summarise(records[:1], METRICS))["run"]["seeds"] == "1001"
 
 
+def test_each_configuration_has_its_own_deviations_of_all_tasks() -> None:
+    """The page said of a profile what another one of its simulator deviates in."""
+    records = [
+        record(profile=profile, task=task, deviations=(told,))
+        for profile, task, told in (("tuned", "stacking", "cut"), ("tuned", "throwing", "soft"),
+                                    ("default", "stacking", "soft"))
+    ]  # fmt: skip
+    shown = setup(summarise(records, METRICS))["simulators"]
+    found = {one["label"]: one["deviations"] for one in shown}
+    assert found == {
+        "mujoco headless default": ["soft"], "mujoco headless tuned": ["cut", "soft"],
+    }  # fmt: skip
+
+
 def test_the_command_runs_the_same_seed_again() -> None:
     given = record(test="suites/test_x.py::test_x[a b-'c]", mode="gui", jitter=0.5)
     assert shlex.split(command(given)) == [
