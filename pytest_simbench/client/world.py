@@ -89,9 +89,9 @@ class World:
             self._compile()
         with self.phase("load"), self.stopwatch.measuring("load"):
             answer = process.request("load", scene=self._wire(), parity=parity)
+            self._take(answer)
         self.excused: list[str] = answer["excused"]
         self._timestep = float(answer["timestep"])
-        self._take(answer)
         self._enter("task")  # between the phases that the task names
         self._after_phase = after_phase
 

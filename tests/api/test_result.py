@@ -126,7 +126,9 @@ def test_records_are_a_frame_where_a_package_makes_one(
 def test_the_report_is_a_page_or_all_files(write: Write, tmp_path: Path) -> None:
     run = write("run")
     assert run.report() == run.folder / "report.html"
-    assert run.report(tmp_path / "new" / "mine.html").read_text().startswith("<!DOCTYPE html>")
+    alone = run.report(tmp_path / "new" / "mine.html").read_text()
+    assert alone.startswith("<!DOCTYPE html>")
+    assert "records.jsonl, which lies beside this file" not in alone
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["mine.html"]
     assert run.report(tmp_path / "all") == tmp_path / "all" / "report.html"
     assert (tmp_path / "all" / "report.md").is_file()

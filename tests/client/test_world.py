@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
 from typing import Any
 
@@ -37,8 +37,8 @@ def opened(
     """A world in a worker of its own, whose motion is kept with this period [s]."""
     process = WorkerProcess(case.launch("x"), Where(case.simulator, case.mode))
     process.construct(changes=changes)
-    yield World(process, scene, trace_period=period)
-    process.close()
+    with closing(process):
+        yield World(process, scene, trace_period=period)
 
 
 def test_what_was_undone_is_not_in_it(case: Case) -> None:
@@ -65,6 +65,13 @@ def test_what_went_wrong_is_in_it(case: Case) -> None:
     with opened(case, blown, 0.02) as world, pytest.raises(Diverged, match="left the room"):
         world.wait(0.4)
     assert Motion.joined(world.trace).bodies[-1, 0, 0] > 5.0
+
+
+def test_what_cannot_be_at_the_start_is_wrong_with_its_loading(case: Case) -> None:
+    fast = replace(SCENE, bodies=(SCENE.bodies[0].changed(linear_velocity=(99.0, 0.0, 0.0)),))
+    with pytest.raises(Diverged, match="'a' moves at 99 m/s") as raised, opened(case, fast):
+        pass
+    assert raised.value.phase == "load"
 
 
 def test_an_impact_is_no_divergence_where_the_task_says_so(case: Case) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 from pytest_simbench.records.configuration import TASK, bare, text
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import told
-from pytest_simbench.report.model import tables
 from pytest_simbench.report.model.summary import TaskSummary
 
 
@@ -16,7 +15,6 @@ def setup(summaries: Sequence[TaskSummary]) -> dict[str, Any]:
     """What holds for the whole `run`, each with all its values (protocol, jitter, seeds, limits,
     machines), the parameters of each of the `tasks`, and for each of the `simulators` settings,
     versions and deviations."""
-    deviations = tables.deviations(summaries)
     tasks: dict[str, dict[str, list[str]]] = {}
     simulators: dict[tuple[str, ...], dict[str, Any]] = {}
     for summary in summaries:
@@ -31,9 +29,10 @@ def setup(summaries: Sequence[TaskSummary]) -> dict[str, Any]:
                 "of": row.of,
                 "settings": settings,
                 "versions": versions,
-                "deviations": [what for who, what in deviations if who == row.simulator],
+                "deviations": [],
             }
-            simulators.setdefault((*row.of, text(settings), text(versions)), found)
+            found = simulators.setdefault((*row.of, text(settings), text(versions)), found)
+            found["deviations"] = sorted({*found["deviations"], *row.deviations})
     shared = {
         task: {name: _joined(values) for name, values in parameters.items()}
         for task, parameters in tasks.items()

@@ -127,6 +127,8 @@ def _strip(metric: Metric, summary: TaskSummary, number: Callable[[Record], int]
         low, high = 0.0, 1.0
     elif reference is not None and math.isfinite(reference):
         low, high = min(low, reference), max(high, reference)
+    if low < high:  # what means nothing is not drawn as wide as what does
+        high = max(high, low + metric.smallest_difference)
     log = cost and low > 0 and high / low > LOGARITHMIC
     scale = _scale(low, high, log)
 

@@ -119,6 +119,20 @@ def test_the_setup_tells_settings_versions_and_machines() -> None:
     assert setup(summarise(records[:1], METRICS))["run"]["seeds"] == "1001"
 
 
+def test_each_configuration_has_its_own_deviations_of_all_tasks() -> None:
+    """The page said of a profile what another one of its simulator deviates in."""
+    records = [
+        record(profile=profile, task=task, deviations=(told,))
+        for profile, task, told in (("tuned", "stacking", "cut"), ("tuned", "throwing", "soft"),
+                                    ("default", "stacking", "soft"))
+    ]  # fmt: skip
+    shown = setup(summarise(records, METRICS))["simulators"]
+    found = {one["label"]: one["deviations"] for one in shown}
+    assert found == {
+        "mujoco headless default": ["soft"], "mujoco headless tuned": ["cut", "soft"],
+    }  # fmt: skip
+
+
 def test_the_command_runs_the_same_seed_again() -> None:
     given = record(test="suites/test_x.py::test_x[a b-'c]", mode="gui", jitter=0.5)
     assert shlex.split(command(given)) == [
@@ -193,6 +207,16 @@ def test_values_keep_their_order_and_the_reference_has_its_place() -> None:
     assert not plot.study
     assert all(LEFT <= dot.x <= RIGHT for line in plot.lines for dot in line.dots)
     assert [dot.x for dot in plot.lines[1].lost] == [LOST]
+
+
+def test_rounding_is_not_drawn_as_a_spread() -> None:
+    """Nanometres went from one end to the other, above five ticks that all said 0."""
+    records = [
+        record(repetition=k, task="throwing", metrics={"landing_error": 1e-9 * k}) for k in range(9)
+    ]
+    plot = plots(records)["landing error m"]
+    assert {dot.x for dot in plot.lines[0].dots} == {LEFT}
+    assert [text for _, text in plot.ticks] == ["0", "0.00025", "0.0005", "0.00075", "0.001"]
 
 
 def test_costs_that_differ_widely_are_logarithmic() -> None:
