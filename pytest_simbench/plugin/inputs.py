@@ -52,7 +52,10 @@ def check(config: pytest.Config) -> None:
         from pytest_simbench.simulator import SimulatorError
 
         with options.refusing(SimulatorError, "--sim-scene"):
-            read_scene_file(options.value(config, "sim_scene"))
+            scene = read_scene_file(options.value(config, "sim_scene")).scene
+        alone = config.args_source is not config.ArgsSource.ARGS  # not for tests of the user's
+        if alone and scene.robot is None and not scene.free_bodies:
+            raise pytest.UsageError(f"--sim-scene: nothing in {scene.name!r} can move; free a body")
 
 
 def _data_folder(config: pytest.Config) -> Path:

@@ -237,3 +237,9 @@ def test_a_urdf_is_a_scene_and_a_broken_one_ends_the_run(pytester: pytest.Pytest
     path.write_text(CABINET.replace('value="2"', 'value="-2"'))
     found = run_pytest(pytester, "", *asked, ret=pytest.ExitCode.USAGE_ERROR)
     found.stderr.fnmatch_lines(["ERROR: --sim-scene: *cabinet.urdf, line 4: *mass -2 kg*"])
+    still = '<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>'
+    pytester.path.joinpath("wall.xml").write_text(still)
+    found = run_pytest(
+        pytester, "--sim-scene=wall.xml --sim=mujoco", ret=pytest.ExitCode.USAGE_ERROR
+    )
+    found.stderr.fnmatch_lines(["ERROR: --sim-scene: nothing in 'wall' can move; free a body"])
