@@ -194,8 +194,9 @@ RATIO = Metric("ratio", "ratio", better=None, least=0.0, resolution=0.0)
 
 def over(a: ResultSet, b: ResultSet, metric: str = "error") -> list[float]:
     """A metric of one over that of another, seed by seed. A world that diverged is `FAR` times as
-    far off as one that did not."""
+    far off as one that did not, and so is one that is off at all beside one that is not."""
     first, second = a.by_seed(metric), b.by_seed(metric)
-    found = [first[seed] / second[seed] for seed in first if second.get(seed)]
+    both = [(first[seed], second[seed]) for seed in first if seed in second]
+    found = [x / y if y else FAR if x else 1.0 for x, y in both]
     lost = [{r.seed for r in each.crashed} if metric == "error" else set() for each in (a, b)]
     return found + [FAR] * len(lost[0] - lost[1]) + [1 / FAR] * len(lost[1] - lost[0])

@@ -216,7 +216,8 @@ class World:
 
         Args:
             policy: see `scene.policy`: an object with `act`, or a function of an observation.
-            until: simulated seconds, or what ends the loop once it holds of what is (undelayed).
+            until: simulated seconds, to the nearest period and one at least; or what ends the loop
+                once it holds of what is (undelayed).
             at_most: seconds that the loop lasts if that never holds.
             rate: how often it is asked [Hz]; default: the policy's own.
             seed: of its `reset`; default: the repetition's.

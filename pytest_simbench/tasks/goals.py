@@ -38,7 +38,7 @@ class GoalTask(Task):
 
     Attributes:
         policy: whatever has `act`, or a function of an observation; see `scene.policy`.
-        seconds: that it has [s].
+        seconds: that it has [s], to the nearest period of the policy.
         tolerance: within which what is moved is at its goal [m].
         rate: how often the policy is asked [Hz]; None: as it says itself.
         command_latency, observation_delay: see `World.control` [s].

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.scene import FloatArray, Pose, Scene
-from pytest_simbench.scene.policy import Function, Policy
+from pytest_simbench.scene.policy import Function
 from pytest_simbench.scene.set_points import SetPoints, Sight, written
 from pytest_simbench.simulator import PolicyError
 from pytest_simbench.worker.wire import named
@@ -121,6 +121,9 @@ def inside(scene: Scene, told: Row, period: float, policy: Mapping[str, Any]) ->
         PolicyError: its source does not run here.
     """
     made = _made(policy)
+    act = getattr(made, "act", made)
+    if reset := getattr(made, "reset", None):
+        _asked(policy, reset, policy["seed"])
     goal = None if policy["goal"] is None else Pose.from_array(policy["goal"])
     sight = Sight(scene, goal=goal)
     points = SetPoints(scene.arm, told[0], told[2], period)
@@ -129,15 +132,19 @@ def inside(scene: Scene, told: Row, period: float, policy: Mapping[str, Any]) ->
         time: float, joints: FloatArray, told: Row, bodies: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         state = written(time, joints, told, bodies)  # as outside: it cannot be written to
-        try:
-            points.after(made(sight.read(np.frombuffer(state))))
-        except PolicyError:
-            raise
-        except (Exception, SystemExit) as error:
-            raise PolicyError(f"the policy {policy['name']} {raised(error)}") from error
+        points.after(_asked(policy, act, sight.read(np.frombuffer(state))))
         return points.position, points.effort
 
     return answer
+
+
+def _asked(policy: Mapping[str, Any], what: Callable[[Any], Any], given: Any) -> Any:
+    try:
+        return what(given)
+    except PolicyError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise PolicyError(f"the policy {policy['name']} {raised(error)}") from error
 
 
 def raised(error: BaseException) -> str:
@@ -149,8 +156,8 @@ def raised(error: BaseException) -> str:
     return f"raised {named(error)}{at}"
 
 
-def _made(policy: Mapping[str, Any]) -> Callable[[Any], Any]:
-    """The policy's `act`, its episode begun."""
+def _made(policy: Mapping[str, Any]) -> Any:
+    """The policy: an object, or a function."""
     module = ModuleType(MODULE)
     module.__file__ = policy["path"]
     sys.modules[MODULE] = module  # dataclasses look their module up
@@ -158,13 +165,12 @@ def _made(policy: Mapping[str, Any]) -> Callable[[Any], Any]:
         exec(compile(policy["source"], policy["path"], "exec"), vars(module))
         found = getattr(module, policy["name"])
         if not isinstance(found, type):
-            return found  # type: ignore[no-any-return]
-        made: Policy = object.__new__(found)
+            return found
+        made: Any = object.__new__(found)
         vars(made).update(policy["state"])
-        made.reset(policy["seed"])
     except (Exception, SystemExit) as error:
         raise PolicyError(
             f"the policy {policy['name']} cannot run inside the worker: {named(error)}; put it "
             "into a file of its own that imports numpy and what the worker has"
         ) from error
-    return made.act
+    return made

@@ -28,6 +28,7 @@ from pytest_simbench.scene import Pose, Scene
 from pytest_simbench.scene.policy import Command, Function, LoopError, Observation, Policy
 from pytest_simbench.tasks import Reaching
 from pytest_simbench.tasks.base import cube
+from pytest_simbench.worker import loop
 from tests.client.failing import failure
 from tests.client.waving import Waving, stalling, still, writing
 
@@ -259,6 +260,19 @@ def test_what_cannot_run_inside(world: Worlds, policy: Any, told: str) -> None:
     one = world()
     with pytest.raises(PolicyFailed, match=told):
         one.control(policy, until=0.1, inside=True)
+
+
+def test_one_inside_needs_no_reset_and_one_that_raises_is_told_in_its_own_words() -> None:
+    source = "class Plain:\n    def act(self, seen):\n        return None\n"
+    made = {"path": "plain.py", "source": source, "name": "Plain", "state": {}, "seed": 1}
+    rows = np.zeros(9), np.zeros(9), np.zeros(9)
+    answer = loop.inside(SCENE, rows, 0.1, made | {"goal": None})
+    at = answer(0.0, np.zeros((2, 9)), rows, np.zeros((1, 13)))
+    assert at is not None
+    assert not np.any(at)
+    made["source"] += "    def reset(self, seed):\n        raise ValueError(seed)\n"
+    with pytest.raises(PolicyError, match=r"policy Plain raised ValueError: 1 \(plain.py:5\)"):
+        loop.inside(SCENE, rows, 0.1, made | {"goal": None})
 
 
 def test_what_of_a_policy_goes_to_the_worker() -> None:

@@ -6,6 +6,7 @@ import re
 import sys
 from collections import Counter
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,7 +15,7 @@ sys.path.append(str(ROOT / "docs"))
 
 import made  # noqa: E402
 import make_claims  # noqa: E402
-from pytest_simbench.suites.referee import verdict  # noqa: E402
+from pytest_simbench.suites.referee import FAR, over, verdict  # noqa: E402
 
 
 def test_the_page_says_what_the_numbers_say() -> None:
@@ -45,6 +46,13 @@ def test_the_page_says_what_the_numbers_say() -> None:
 def test_a_verdict_on_a_claim(one: list[str], other: list[str], found: str) -> None:
     assert verdict({"one": one, "other": other}) == found
     assert verdict({}) == "cannot be decided"
+
+
+def test_what_is_not_off_at_all_is_beaten_by_nobody() -> None:
+    """Seeds at which the other one had an error of 0 were left out."""
+    sides = {1: 2.0, 2: 1.0, 3: 0.0, 4: 0.0, 5: 1.0}, {1: 4.0, 2: 0.0, 3: 0.0, 4: 1.0}
+    a, b = (SimpleNamespace(by_seed=lambda _, of=of: of, crashed=()) for of in sides)
+    assert over(a, b) == [0.5, FAR, 1.0, 0.0]  # type: ignore[arg-type]
 
 
 def test_a_number_that_nobody_can_judge_is_not_told_as_missed() -> None:
