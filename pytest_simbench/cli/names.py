@@ -45,7 +45,7 @@ def read_names(asked: Iterable[str], here: Path) -> tuple[list[str], dict[str, s
         if base != base_name(base):
             raise BadInput(f"{where}: a build has no release; write {base_name(base)}@PYTHON")
         label, equals, path = rest.partition("=")
-        if not equals:
+        if not equals or "/" in label:  # the path of a release's environment has a = too
             label, path = "", rest
         elif not LABEL.fullmatch(label):
             raise BadInput(f"{where}: a label has letters, digits, and . + - _ between them")

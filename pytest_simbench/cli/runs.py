@@ -98,7 +98,7 @@ def _outcome(folders: Folders, readings: dict[str, RunContents]) -> tuple[RunOut
     together = False if False in passed else None if unknown else True
     ended = all(outcome.ended for outcome in outcomes)
     looks = max(outcome.looks for outcome in outcomes)
-    cut = tuple(sorted({test for outcome in outcomes for test in outcome.cut}))
+    cut = tuple(sorted({test for one in outcomes for test in (*one.cut, *one.open)}))
     return RunOutcome(together, looks=looks, ended=ended, cut=cut), wrong
 
 

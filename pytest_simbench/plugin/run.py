@@ -219,7 +219,8 @@ class Run:
         The test fails where `--sim-threshold` gives one of its metrics a value that can never fail.
         """
         self.folder.describe(task)
-        write_outcome(self.folder.path, begun(self.folder.path))
+        tests = {test for test, *_ in self._attempts}
+        write_outcome(self.folder.path, begun(self.folder.path, tests))
         if wrong := thresholds.bad_value(self._thresholds, task.metrics):
             pytest.fail(wrong, pytrace=False)
 
@@ -303,8 +304,8 @@ class Run:
         before = self.resumed.records if self.resumed else ()
         looks, cut = looks_at(path, before, records), cut_at(path, before, records, self.judged)
         passed = passed and not self.failing
-        ended = not (passed and cut)  # else a test that was cut short has still to be judged
-        outcome = RunOutcome(passed if ended else None, found, looks, ended, cut)
+        judged = None if passed and cut else passed  # one that was cut short is not judged yet
+        outcome = RunOutcome(judged, found, looks, cut=cut)
         written = write_files(path, Report.of(self.reading, outcome))
         unsaved = self.folder.flush()
         problems = [*self.told, *self.reading.problems, *self.reading.refused]

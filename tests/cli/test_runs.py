@@ -226,7 +226,8 @@ def test_all_that_is_said_of_two_runs_together(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "110")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    outcomes = RunOutcome(True, cut=("test_b", "test_a")), RunOutcome(None, looks=3, ended=False)
+    killed = RunOutcome(None, looks=3, ended=False, open=("test_a",))
+    outcomes = RunOutcome(True, cut=("test_b",)), killed
     for name, metrics, outcome in zip("ab", ({"placed": 1.0}, {}), outcomes, strict=True):
         folder = RunFolder(here / name)
         folder.append(replace(stacking(simulator=name), metrics=metrics))

@@ -62,7 +62,7 @@ def test_versions_side_by_side(pytester: pytest.Pytester, release: str) -> None:
 def test_a_build_without_a_label_is_called_by_its_version(
     pytester: pytest.Pytester, release: str
 ) -> None:
-    python = wrapper(pytester.path / "mine" / "python")
+    python = wrapper(pytester.path / "mujoco==1.2" / "python")
     selection = select(pytester.parseconfig(f"--sim=mujoco@{python}"))
     name = release.replace("==", "@")
     assert selection.simulators == (name,)

@@ -14,6 +14,8 @@ import pytest
 
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.records.record import Failure
+from pytest_simbench.report.files import write_outcome
+from pytest_simbench.report.model.outcome import begun
 from tests.approval import assert_approved
 from tests.made_up import MadeUp
 
@@ -151,8 +153,12 @@ def test_one_that_is_cut_and_completed() -> None:
     assert_approved("run-cut", text)
 
 
-def test_one_that_is_cut_and_completed_in_part_has_not_passed() -> None:
+@pytest.mark.parametrize("killed", [False, True])
+def test_one_that_is_cut_and_completed_in_part_has_not_passed(killed: bool) -> None:
     run("--sim-output=cut -k high", cut=4)
+    if killed:
+        name = "test_runs.py::test_claims[mujoco-headless-high]"
+        write_outcome(Path("cut"), begun(Path("new"), [name]))
     text = run("--sim-resume=cut -k low")
     assert "exit code 0" in text
     assert "UNDECIDED   1 of 1 claims hold; the run did not end: resume it; 0 of 11" in text

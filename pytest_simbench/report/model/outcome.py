@@ -24,7 +24,7 @@ Compared = tuple[str, GateReport]
 
 SCHEMA = 1
 
-KEPT = ("passed", "looks", "ended", "cut")
+KEPT = ("passed", "looks", "ended", "cut", "open")
 """Attributes that the file has as they are."""
 
 LARGEST = 64 * 2**20
@@ -42,6 +42,7 @@ class RunOutcome:
             begun, and never was.
         ended: whether it came to its end; one that was killed did not.
         cut: tests that were cut short between two repetitions, and not judged.
+        open: tests that were begun since the run last ended; none where it has ended.
     """
 
     passed: bool | None = None
@@ -49,6 +50,7 @@ class RunOutcome:
     looks: int = 1
     ended: bool = True
     cut: tuple[str, ...] = ()
+    open: tuple[str, ...] = ()
 
     def to_json(self) -> str:
         """What a run folder keeps of it."""
@@ -112,15 +114,18 @@ def looks_at(folder: Path, before: Iterable[Record], now: Iterable[Record]) -> i
 def cut_at(
     folder: Path, before: Iterable[Record], now: Iterable[Record], judged: Collection[str]
 ) -> tuple[str, ...]:
-    """Tests that have repetitions, and now or before were not `judged`."""
+    """Tests that have repetitions or were killed, and now or before were not `judged`."""
+    so_far = _so_far(folder)
     known = {(r.test, r.repetition) for r in before if r.status != "interrupted"}
     begun = {r.test for r in now if (r.test, r.repetition) not in known}
-    return tuple(sorted({*_so_far(folder).cut, *begun}.difference(judged)))
+    return tuple(sorted({*so_far.cut, *so_far.open, *begun}.difference(judged)))
 
 
-def begun(folder: Path) -> RunOutcome:
+def begun(folder: Path, tests: Iterable[str] = ()) -> RunOutcome:
     """What the folder of a run says until it ends: a killed one says no more."""
-    return replace(_so_far(folder), passed=None, compared=None, ended=False)
+    so_far = _so_far(folder)
+    found = tuple(sorted({*so_far.open, *tests}))
+    return replace(so_far, passed=None, compared=None, ended=False, open=found)
 
 
 def _so_far(folder: Path) -> RunOutcome:

@@ -51,7 +51,8 @@ class Report:
         # A scene that is left to itself has a section that holds its releases against its noise.
         tests = [record for record in reading.records if record.task != SETTLING]
         outcome = outcome or RunOutcome()
-        compared = outcome.compared
+        compared, passed = outcome.compared, outcome.passed
+        ended = outcome.ended and not (passed is None and outcome.cut)
         found = summarise(at_own_steps(records), reading.metrics, reading.references)
         return cls(
             [replace(summary, looks=outcome.looks) for summary in found],
@@ -60,7 +61,7 @@ class Report:
             sweeps(reading.records, reading.metrics),
             settlings(reading.records),
             transfers(records),
-            claims_of(reading, compared[1] if compared else None, outcome.passed, outcome.ended),
+            claims_of(reading, compared[1] if compared else None, passed, ended),
             compared,
         )
 
