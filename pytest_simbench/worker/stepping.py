@@ -240,7 +240,7 @@ class Stepper:
             films = film_every and (totals.steps + k) % film_every == 0
             if logs or asks or checks:
                 spent = family.cpu if asks else time.thread_time
-                paused, waits, cpu = time.perf_counter(), clock.waited(), spent()
+                paused, cpu, waits = time.perf_counter(), spent(), clock.waited()
                 now = states.time_after(k, from_time)
                 joints, bodies = states.joints(), states.bodies()
                 if logs:
@@ -252,8 +252,8 @@ class Stepper:
                     due = watch.due - from_start
                 if loop is not None and asks and not loop.ask(now, joints, bodies):
                     steps = k
-                aside_cpu += spent() - cpu
                 aside_waited += clock.waited() - waits
+                aside_cpu += spent() - cpu
                 aside += time.perf_counter() - paused
             if not (checks or films or k % look_every == 0 or k == steps):
                 continue
