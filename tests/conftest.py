@@ -189,8 +189,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
     """Nobody asks the workers that tests of engines share from here on: two idle ones of an engine
     whose threads spin take 0.8 of two cores."""
-    engines = [of is not None and of.get_closest_marker("engine") for of in (item, nextitem)]
-    if engines[0] and not engines[1]:
+    if nextitem is None or not nextitem.get_closest_marker("engine"):
         close_workers()
 
 

@@ -136,7 +136,7 @@ def merge_runs(
             folder.describe(task)
         for part in folders.values():
             for name, account in kept(part.path).items():
-                keep(folder.path, Path(name), account)
+                keep(folder.path, part.path / name, account)  # named by the part where two differ
         refused = _copy(records, folders, folder)
         unsaved = folder.flush()
         found, wrong = _outcome(folders, readings)

@@ -60,12 +60,9 @@ MOVING = ("pose", "velocity", "initial_position")
 """Kinds of quantities that change while a world is stepped."""
 
 
-def expected_quantities(
-    scene: Scene, settings: Settings, prepared: PreparedRobot | None = None
-) -> dict[str, Any]:
-    """Every quantity that an engine should report of a scene; `prepared`: its robot, if it is."""
-    if scene.robot is not None and prepared is None:
-        prepared = PreparedRobot(scene.robot)
+def expected_quantities(scene: Scene, settings: Settings) -> dict[str, Any]:
+    """Every quantity that an engine should report of a scene."""
+    prepared = None if scene.robot is None else PreparedRobot(scene.robot)
     quantities: dict[str, Any] = {
         "gravity": scene.gravity,
         "timestep": settings.timestep,

@@ -85,7 +85,6 @@ class Server:
         self.simulator: Simulator | None = None
         self.stepper: Stepper | None = None
         self.scene = Scene("empty")
-        self.robot: PreparedRobot | None = None
         self.compared: tuple[dict[str, Any], dict[str, Any]] | None = None
         self.saved: dict[str, Any] = {}
         self.number, self.pid = 0, os.getpid()
@@ -171,9 +170,8 @@ class Server:
         check_start(simulator, world)
         self.compared = None
         if parity:
-            self.robot = None if world.robot is None else PreparedRobot(world.robot)
             expected, reported = (
-                expected_quantities(world, simulator.settings, self.robot),
+                expected_quantities(world, simulator.settings),
                 checked_quantities(simulator),
             )
             info = simulator.info
@@ -192,8 +190,7 @@ class Server:
     def do_watch(self, seed: int) -> None:
         """From now on, look whether the world stays as it was loaded; see `Watch`."""
         if self.compared is not None:
-            simulator, scene = self._constructed(), self.scene
-            self._loaded().watch = Watch(simulator, scene, *self.compared, seed, self.robot)
+            self._loaded().watch = Watch(self._constructed(), self.scene, *self.compared, seed)
 
     def do_read_again(self) -> None:
         """Whether the engine still holds what it held when the world was loaded, if watched."""

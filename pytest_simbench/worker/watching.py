@@ -70,7 +70,6 @@ class Watch:
         expected: the scene's quantities (`parity.quantities`).
         reported: what the engine told of them.
         seed: of the repetition; draws the steps.
-        robot: the scene's, if it is prepared; another one than the simulator's, which may change.
 
     Attributes:
         due: the step, counted since loading, after which it wants to look.
@@ -84,7 +83,6 @@ class Watch:
         expected: Mapping[str, Any],
         reported: Mapping[str, Any],
         seed: int,
-        robot: PreparedRobot | None = None,
     ) -> None:
         self._simulator, self._title = simulator, simulator.info.title
         declared = [d.with_robot(scene.robot) for d in simulator.info.deviations]
@@ -112,7 +110,7 @@ class Watch:
             [expected.get(f"body/{name}/damping", np.zeros(2))[0] for name in self._names]
         )
         self._gravity = np.asarray(scene.gravity, dtype=float)
-        self._obstacles = Obstacles(scene, expected, robot)
+        self._obstacles = Obstacles(scene, expected)
 
     @property
     def due(self) -> int:
@@ -249,12 +247,8 @@ class Obstacles:
     """Boxes around all that a body can touch, but for the ground: from the outlines of a scene's
     quantities."""
 
-    def __init__(
-        self, scene: Scene, expected: Mapping[str, Any], robot: PreparedRobot | None = None
-    ) -> None:
-        self._robot = robot
-        if scene.robot is not None and robot is None:
-            self._robot = PreparedRobot(scene.robot)
+    def __init__(self, scene: Scene, expected: Mapping[str, Any]) -> None:
+        self._robot = None if scene.robot is None else PreparedRobot(scene.robot)
         self._fixed = np.array([body.pose.as_array() for body in scene.fixed_bodies]).reshape(-1, 7)
         names = [f"body/{body.name}" for body in (*scene.free_bodies, *scene.fixed_bodies)]
         names += [] if self._robot is None else [f"link/{name}" for name in self._robot.links]

@@ -77,8 +77,8 @@ class ReadBack(readback.ReadBack):
         excluded = np.isin((ends[0] << 16) + ends[1], model.exclude_signature)
         masks = types[:, None] & affinities | affinities[:, None] & types
         self._collide = (masks != 0) & ~excluded
-        pairs = [model.pair_geom1, model.pair_geom2]  # collide whatever their masks
-        self._collide[*pairs] = self._collide[*pairs[::-1]] = True
+        a, b = model.pair_geom1, model.pair_geom2  # they collide whatever their masks
+        self._collide[a, b] = self._collide[b, a] = True
         self._collide &= not self.off & {"CONTACT", "CONSTRAINT"}
         scene = simulator.scene
         super().__init__(
