@@ -50,7 +50,7 @@ class Opened:
         self, path: Path, width: int = 1400, height: int = 900, fragment: str = "", **given: Any
     ) -> Page:
         context = self._browser.new_context(viewport={"width": width, "height": height}, **given)
-        context.set_default_timeout(10_000)
+        context.set_default_timeout(60_000)
         self._contexts.append(context)
         page: Page = context.new_page()
         page.on("console", self._said)
