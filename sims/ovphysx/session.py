@@ -42,6 +42,10 @@ _EVENTS = (
 )
 """Of each contact: whom a prim touches, and impulses along the normal and of friction."""
 
+_WITHOUT_SERVICE = {"/UJITSO/enabled": False}
+"""PhysX's service that cooks meshes, and keeps them for other processes, polls each microsecond: a
+quarter of a core for as long as the process lives. Without it hulls and motions have the same bits."""
+
 _registered = False
 
 
@@ -59,7 +63,8 @@ class Session:
         warnings.filterwarnings("ignore", message="ovphysx is in CPU-only mode")
         ovphysx.PhysX.set_cpu_mode(True)
         ovphysx.set_global_config(ovphysx_types.GlobalConfigKey.NUM_THREADS, threads)
-        self.physx = ovphysx.PhysX()
+        config = ovphysx.PhysXConfig(carbonite_overrides=_WITHOUT_SERVICE)
+        self.physx = ovphysx.PhysX(config=config)
         self._stage = None
         try:
             _register_schemas()
