@@ -31,7 +31,6 @@ from pytest_simbench.records.record import Record
 from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.tasks import Task
-from pytest_simbench.testing.subject import close_workers
 from tests.approval import Running, assert_approved_line, watched
 
 with contextlib.suppress(ImportError):
@@ -184,13 +183,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         slow = [item for item in items if getattr(item, "originalname", item.name) in SLOW]
         config.hook.pytest_deselected(items=slow)
         items[:] = [item for item in items if item not in slow]
-
-
-def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
-    """Nobody asks the workers that tests of engines share from here on: two idle ones of an engine
-    whose threads spin take 0.8 of two cores."""
-    if nextitem is None or not nextitem.get_closest_marker("engine"):
-        close_workers()
 
 
 LEAN = "-p no:hypothesispytest"

@@ -6,7 +6,7 @@ import importlib
 import math
 import signal
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import ModuleType
 from typing import Any, ClassVar, TypeVar
@@ -219,6 +219,16 @@ class Simulator(ABC):
     @abstractmethod
     def joint_state(self) -> FloatArray:
         """Positions and velocities of the driven joints, (2, n_joints)."""
+
+    def sample(self) -> Any:
+        """The present state in a form of the engine's own, for logs of each step, where that costs
+        less than the two above. Who derives from an adapter and tells other states is not asked."""
+        raise self._missing("samples")
+
+    def sampled(self, samples: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
+        """What `joint_state` (n, 2, n_joints) and `body_state` (n, n_free, 13) would have told when
+        these samples were taken."""
+        raise self._missing("samples")
 
     def save(self) -> Any:
         """The whole state of the world, to be given to `restore` in this process."""

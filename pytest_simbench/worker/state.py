@@ -36,6 +36,9 @@ SPEED_TOLERANCE = 1e-4
 CLOCK_TOLERANCE = 1e-3
 """Share by which a clock may drift, beside half a step: one of single precision does."""
 
+SAMPLED = 1e-9
+"""Between a state and the sample of it, relative, and in its units: rounding is 1e-15."""
+
 EXCHANGED = 0.1
 """A joint this far from its set point [rad] may have been taken for another one."""
 
@@ -91,6 +94,34 @@ class States:
             StateError: a wrong type, shape or kind of number.
         """
         return _checked(self.simulator, "body_state", (len(self.scene.free_bodies), 13))
+
+    def quick(self) -> bool:
+        """Whether `Simulator.sample` stands for the states that the adapter tells."""
+        simulator = self.simulator
+        if vars(simulator).keys() & {"joint_state", "body_state"}:
+            return False
+        asked = [
+            next(cls for cls in type(simulator).__mro__ if name in vars(cls))
+            for name in ("sample", "joint_state", "body_state")
+        ]
+        return all(issubclass(asked[0], other) for other in asked[1:])
+
+    def sampled(self, samples: Sequence[Any]) -> tuple[FloatArray, FloatArray]:
+        """Joints (n, 2, n_joints) and bodies (n, n_free, 13) of what `Simulator.sample` gave.
+
+        Raises:
+            StateError: a wrong shape; or a sample of now tells another state than `joints` and
+                `bodies`.
+        """
+        logged = self.simulator.sampled([*samples, self.simulator.sample()])
+        for found, now, method in zip(
+            logged, (self.joints(), self.bodies()), ("joint_state", "body_state"), strict=True
+        ):
+            if found.shape != (len(samples) + 1, *now.shape) or not np.allclose(
+                found[-1], now, rtol=SAMPLED, atol=SAMPLED, equal_nan=True
+            ):
+                raise StateError(f"{self._name}: sampled() tells another state than {method}()")
+        return logged[0][:-1], logged[1][:-1]
 
     @property
     def _name(self) -> str:

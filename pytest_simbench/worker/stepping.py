@@ -216,7 +216,9 @@ class Stepper:
         film_every = self.film[0] if self.film is not None else 0
         ask_every = loop.every if loop is not None else 0
         states, from_time = self.states, self.states.time()
-        samples: list[tuple[float, FloatArray, FloatArray]] = []
+        quick = states.quick()
+        times: list[float] = []
+        samples: list[Any] = []
         watch, from_start = self.watch, self.clocks.steps
         due = watch.due - from_start if watch is not None else 0
         step, command, clock = simulator.step, simulator.command, self._clock
@@ -242,9 +244,11 @@ class Stepper:
                 spent = family.cpu if asks else time.thread_time
                 paused, cpu, waits = time.perf_counter(), spent(), clock.waited()
                 now = states.time_after(k, from_time)
-                joints, bodies = states.joints(), states.bodies()
+                if checks or asks or not quick:
+                    joints, bodies = states.joints(), states.bodies()
                 if logs:
-                    samples.append((now, joints, bodies))
+                    times.append(now)
+                    samples.append(simulator.sample() if quick else (joints, bodies))
                 if checks or asks:
                     self._check_finite(now, joints, bodies)
                 if checks and watch is not None:
@@ -285,8 +289,10 @@ class Stepper:
             resumed, waited = clock()
         totals.steps += steps
         totals.simulated += steps * timestep
-        columns = map(np.array, zip(*samples, strict=True))
-        return dict(zip(LOG, columns, strict=True)) if samples else {}
+        if not samples:
+            return {}
+        logged = states.sampled(samples) if quick else map(np.array, zip(*samples, strict=True))
+        return dict(zip(LOG, (np.array(times), *logged), strict=True))
 
     def _check_finite(self, time: float, joints: FloatArray, bodies: FloatArray) -> None:
         for what, state in (("joints", joints), ("bodies", bodies)):

@@ -9,7 +9,7 @@ What was learnt stands in docs/engines/mujoco.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -157,12 +157,24 @@ class MuJoCo(Simulator):
         return float(self.data.time)
 
     def body_state(self) -> FloatArray:
-        state = np.concatenate([self.data.qpos, self.data.qvel]).take(self._body_rows)
-        state[:, 10:] = rotated(state[:, 3:7], state[:, 10:])
-        return state
+        return self._bodies(np.concatenate([self.data.qpos, self.data.qvel]).take(self._body_rows))
+
+    def _bodies(self, rows: FloatArray) -> FloatArray:
+        """Rows (n, 13) whose angular velocities are in the body's frame, as MuJoCo has them."""
+        rows[:, 10:] = rotated(rows[:, 3:7], rows[:, 10:])
+        return rows
 
     def joint_state(self) -> FloatArray:
         return np.array([self.data.qpos[self._q], self.data.qvel[self._v]])
+
+    def sample(self) -> FloatArray:
+        return np.concatenate([self.data.qpos, self.data.qvel])
+
+    def sampled(self, samples: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+        states = np.array(samples)
+        rows = states[:, self._body_rows]
+        joints = states[:, np.array([self._q, self.model.nq + self._v])]
+        return joints, self._bodies(rows.reshape(-1, 13)).reshape(rows.shape)
 
     def save(self) -> FloatArray:
         kind = mujoco.mjtState.mjSTATE_INTEGRATION

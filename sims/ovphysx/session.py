@@ -43,8 +43,8 @@ _EVENTS = (
 """Of each contact: whom a prim touches, and impulses along the normal and of friction."""
 
 _WITHOUT_SERVICE = {"/UJITSO/enabled": False}
-"""PhysX's service that cooks meshes, and keeps them for other processes, polls each microsecond: a
-quarter of a core for as long as the process lives. Without it hulls and motions have the same bits."""
+"""PhysX's service that cooks meshes, and keeps them for other processes, polls: a quarter of a core
+for as long as the process lives. Without it hulls and motions have the same bits."""
 
 _registered = False
 

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
-from pytest_simbench.scene import Cylinder, Pose, Scene
+from pytest_simbench.scene import Box, Cylinder, Pose, Robot, Scene
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.testing import scenes
+from pytest_simbench.worker.stepping import Stepper
 from sims.mujoco.bounces import LARGEST, damping_ratio, direct, restitution_of
 
 from .worlds import Worlds, loaded, stepped
@@ -112,3 +113,28 @@ def test_a_round_body_has_the_friction_of_the_pair(name: str) -> None:
 @pytest.mark.parametrize("name", ["mujoco", "newton"])
 def test_both_adapters_import_it_without(name: str) -> None:
     assert adapter(name).info.environment["MUJOCO_GL"] == "disabled"
+
+
+ARM, SPINNING = (
+    scenes.arm_alone().robot,
+    replace(scenes.cube("cube", Pose.at(0.9, 0.2, 1.0)), angular_velocity=(1.0, -2.0, 3.0)),
+)
+
+
+@pytest.mark.parametrize(("bodies", "robot"), [((SPINNING,), ARM), ((), ARM), ((SPINNING,), None)])
+def test_a_log_of_each_step_is_of_the_states_then(
+    bodies: tuple[Box, ...], robot: Robot | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulator, seen = loaded(MuJoCo, scene := Scene("logged", bodies, robot)), []
+    step = simulator.step
+
+    def looking() -> None:
+        step()
+        seen.append((simulator.joint_state(), simulator.body_state()))
+
+    monkeypatch.setattr(simulator, "step", looking)
+    log = Stepper(simulator, scene, lambda at: None).wait(0.02, 0.0)
+    joints, rows = zip(*seen, strict=True)
+    np.testing.assert_allclose(log["joints"], joints, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(log["bodies"], rows, rtol=1e-12, atol=1e-15)
+    simulator.close()

@@ -6,7 +6,10 @@ are skipped with the command that makes it.
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
+import psutil
 import pytest
 from pytest_simbench.sims.ovphysx.adapter import OvPhysX
 
@@ -43,6 +46,15 @@ def test_bowls_that_lie_in_each_other_are_no_larger_than_they_are() -> None:
     """Parity looks when the world is loaded."""
     with Subject(OvPhysX).world(Nesting(2).scene(1, Jitter())) as world:
         assert len(world.bodies) == 2
+
+
+def test_an_engine_that_nobody_asks_takes_no_cpu_time() -> None:
+    """Its cooking service took 0.25 s of each second."""
+    with Subject(OvPhysX).world(scenes.falling()) as world:
+        engine = psutil.Process(world.process.pid)
+        before = engine.cpu_times()
+        time.sleep(1.0)
+        assert sum(engine.cpu_times()[:2]) - sum(before[:2]) < 0.1
 
 
 @pytest.mark.parametrize("rule", ["maximum", "mean", "minimum"])

@@ -166,6 +166,29 @@ def test_what_is_no_state(what: str, change: Callable[[Any], Any], message: str)
     assert message in str(caught.value)
 
 
+@pytest.mark.parametrize("what", ["joint_state", "body_state"])
+def test_who_tells_other_states_is_not_asked_for_samples(what: str) -> None:
+    told = type("Told", (), {"joint_state": 0, "body_state": 0, "sample": 0})
+    assert States(type("Same", (told,), {})(), WORLD).quick()
+    assert not States(type("Other", (told,), {what: 0})(), WORLD).quick()
+    world = told()
+    setattr(world, what, 0)
+    assert not States(world, WORLD).quick()
+
+
+@pytest.mark.parametrize("what", ["joint_state", "body_state"])
+@pytest.mark.parametrize("change", [lambda rows: rows + 2e-9, lambda rows: rows[..., :-1]])
+def test_a_sample_that_tells_another_state(what: str, change: Callable[[Any], Any]) -> None:
+    sound = saying()
+    told = {"joint_state": np.array([HOME, 0 * HOME]), "body_state": sound.body_state()}
+    sound.sample = lambda: told
+    sound.sampled = lambda samples: tuple(np.array([s[n] for s in samples]) for n in told)
+    assert np.array_equal(States(sound, WORLD).sampled([told] * 3)[1], [told["body_state"]] * 3)
+    told[what] = change(told[what])
+    with pytest.raises(StateError, match=f"^sim: sampled.. tells another state than {what}"):
+        States(sound, WORLD).sampled([told])
+
+
 @pytest.mark.parametrize(
     ("found", "message"),
     [
