@@ -7,6 +7,7 @@ from the folders that the client names (and nothing else from there), and serves
 
 import ctypes
 import faulthandler
+import gc
 import importlib.util
 import io
 import os
@@ -113,6 +114,7 @@ def main(channel: Any) -> None:
     sys.meta_path.insert(0, PackageFinder(config["packages"]))
     adopt_orphans()
 
+    gc.disable()  # what is imported stays: to look for garbage meanwhile takes a twentieth longer
     from pytest_simbench.worker.server import serve
 
     serve(requests_of(channel).get, channel.send, config["exchange"])

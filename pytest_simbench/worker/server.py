@@ -9,6 +9,7 @@ and `{"frame": {time, seconds, picture or problem}}` while a film is taken.
 
 from __future__ import annotations
 
+import gc
 import importlib
 import os
 import socket
@@ -127,6 +128,7 @@ class Server:
             for variable, value in cls.info.environment.items():
                 os.environ.setdefault(variable, value)
         _import_engine(cls.info)
+        gc.enable()  # off since the first import
         settings = changed(profile_of(cls.profiles, profile, cls.info.name), changes, cls.info.name)
         if self.simulator is not None:
             self.simulator.close()  # a reused worker starts each world anew
