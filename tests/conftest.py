@@ -134,18 +134,22 @@ SLOW = {
 """They take more than a second of CPU time each, and no engine. The quick tier leaves them out."""
 
 COSTLY = {
-    "ball_rolls", "belt_carries", "compounds_turn_by_their_moments", "every_effort_limit_counts",
-    "fresh_processes_agree", "moves_as_prescribed", "pairs_have_their_friction",
-    "planted_faults_are_seen", "reading_changes_nothing", "rounds_rest",
-    "test_a_file_of_genesis_moves_as_in_mujoco", "test_every_engine_holds_drawer_and_arm",
-    "test_gymnasiums_checker_is_content", "test_in_every_engine_a_drawer_falls",
+    "ball_rolls", "belt_carries", "bounces_as_restitution_says", "can_rolls",
+    "compounds_turn_by_their_moments", "every_effort_limit_counts", "fresh_processes_agree",
+    "friction_is_told", "grip_holds", "links_feel_their_share_of_gravity", "meshes_rest_and_slide",
+    "moves_as_prescribed", "pairs_have_their_friction", "picture_shows_something",
+    "planted_faults_are_seen", "reading_changes_nothing", "rounds_rest", "state_as_loaded",
+    "test_a_file_of_genesis_moves_as_in_mujoco", "test_an_honest_world_passes",
+    "test_every_engine_holds_drawer_and_arm", "test_gymnasiums_checker_is_content",
+    "test_hulls_of_more_than_500_faces_are_kept_whole", "test_in_every_engine_a_drawer_falls",
     "test_it_is_built_falls_and_rests_on_its_lowest_shape",
     "test_joints_move_as_in_mujoco_but_for_the_armature",
     "test_the_engine_tells_what_was_asked_for", "test_the_same_seed_gives_the_same_outcome",
-    "test_two_cubes_are_stacked", "window_changes_nothing", "worlds_leave_no_memory",
+    "test_the_worker_survives_a_bad_option", "test_two_cubes_are_stacked", "velocity_frames",
+    "weight_is_told", "window_changes_nothing", "worlds_leave_no_memory",
 }  # fmt: skip
-"""Tests and laws of the kit for which Genesis compiles 12 to 200 s: a quarter of all tests' time.
-`-m "not costly"`, as CI says, leaves them out, of Genesis alone."""
+"""Tests and laws of the kit for which Genesis compiles 10 to 200 s, and Newton up to 50: a quarter
+of all tests' time. `-m "not costly"`, as CI says, leaves them out, of these two alone."""
 
 ENGINE_FIXTURES = {"case", "handle", "machines", "pytester"}
 """Of tests that run MuJoCo, pytest with simulators, or a cluster of them."""
@@ -172,8 +176,8 @@ def pytest_itemcollected(item: pytest.Item) -> None:
     fixtures -= {"case"} if item.path.stem[5:] in UNRUN else set()
     if rooms & ENGINE_ROOMS or item.path.name == "test_browser.py" or fixtures & ENGINE_FIXTURES:
         item.add_marker("engine")
-    words = fixtures | {*re.split(r"\W+", item.name)}
-    if "genesis" in words and words & COSTLY:
+    words = fixtures | {*re.split(r"\W+", item.name), item.path.stem[5:]}
+    if words & {"genesis", "newton"} and words & COSTLY:
         item.add_marker("costly")
 
 
