@@ -59,14 +59,15 @@ def test_ci_runs_it_on_each_python_and_pytest_with_no_simulator() -> None:
     assert [command for command in commands if "[all" in command] == []
 
 
-def test_ci_runs_everything_but_what_genesis_compiles_long_for() -> None:
+def test_ci_runs_everything_but_what_two_engines_compile_long_for() -> None:
     commands = [step.get("run", "") for step in CI["jobs"]["engines"]["steps"]]
     assert [command for command in commands if "bash .ci/run" in command]
     assert 'pytest tests -n 2 --dist loadgroup -m "not costly"\n' in (ROOT / ".ci/run").read_text()
-    for engine, left_out in (("genesis", ["costly"]), ("newton", [])):
+    for engine, left_out in (("genesis", ["costly"]), ("newton", ["costly"]), ("drake", [])):
         assert marks("tasks/test_it.py", name=f"test_it[{engine}-tuned-ball_rolls]") == left_out
         assert marks("tasks/test_it.py", name=f"test_it[{engine}-tuned-free_fall]") == []
     assert marks("tasks/test_it.py", "genesis", name="test_two_cubes_are_stacked") == ["costly"]
+    assert "costly" in marks("sims/test_genesis.py", name="test_the_worker_survives_a_bad_option")
 
 
 def test_what_is_slow_is_left_out_and_its_names_are_those_of_tests() -> None:
