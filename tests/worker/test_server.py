@@ -160,6 +160,14 @@ def test_nothing_goes_before_the_simulator(ask: Asked, op: str, arguments: dict[
     assert ask.error(op, **arguments) == ("SimulatorError", "no simulator was constructed yet")
 
 
+def test_a_scene_that_an_engine_is_not_able_to(ask: Asked) -> None:
+    ask.construct()
+    scene = replace(SCENE, apart=((f"body/{CUBE.name}", "ground"),))
+    found = ask.error("load", scene=scene.to_wire(), parity=True)
+    assert found[0] == "NotSupportedError"
+    assert not Hosted.calls
+
+
 def test_a_loaded_world(ask: Asked) -> None:
     ask.construct()
     ask("compile", scene=SCENE.to_wire())

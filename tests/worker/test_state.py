@@ -184,6 +184,10 @@ def test_a_sample_that_tells_another_state(what: str, change: Callable[[Any], An
     sound.sample = lambda: told
     sound.sampled = lambda samples: tuple(np.array([s[n] for s in samples]) for n in told)
     assert np.array_equal(States(sound, WORLD).sampled([told] * 3)[1], [told["body_state"]] * 3)
+    nowhere = saying(joints=np.full((2, 9), np.nan))
+    nowhere.sample = lambda: {**told, "joint_state": np.full((2, 9), np.nan)}
+    nowhere.sampled = sound.sampled
+    States(nowhere, WORLD).sampled([told])  # that has diverged, which others tell
     told[what] = change(told[what])
     with pytest.raises(StateError, match=f"^sim: sampled.. tells another state than {what}"):
         States(sound, WORLD).sampled([told])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
@@ -133,6 +134,24 @@ def test_joints_of_a_users_file_may_swing_there_and_back_between_two_looks() -> 
 def test_only_who_is_watched_is_told() -> None:
     """The kit plants faults of its own, and finds them by its laws."""
     assert told("tests.worker.cheats:MuJoCo_lift_later", watched=False) == ""
+
+
+def test_how_long_it_read_is_told_once() -> None:
+    watch, began = Watch(Toy(), Scene("toy"), {}, {}, 1), time.perf_counter()
+    assert watch.spent() == 0.0
+    watch.read()
+    assert 0.0 < watch.spent() < time.perf_counter() - began
+    assert watch.spent() == 0.0
+
+
+def test_a_joint_jumps_from_0_to_rest() -> None:
+    toy = Toy()
+    toy.bodies, toy.joints = np.zeros((0, 13)), np.zeros((2, 9))
+    scene = Scene("arm", robot=panda())
+    watch = Watch(toy, scene, expected_quantities(scene, toy.settings), {}, 1)
+    toy.steps = 1
+    with pytest.raises(ParityError, match="let 'panda_joint1' jump: it moved by 1 rad"):
+        watch.look(1, np.array([[1.0, *[0.0] * 8], [0.0] * 9]), toy.bodies)
 
 
 def test_steps_are_drawn_in_spans_that_grow() -> None:
