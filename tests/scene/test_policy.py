@@ -219,6 +219,14 @@ def test_a_robot_without_a_hand_is_moved_by_all_its_joints() -> None:
         at.after(Command(gripper=0.1))
 
 
+def test_a_hand_without_an_arm_is_moved_by_its_fingers() -> None:
+    """It was told that the joints of its arm are motors."""
+    hand = replace(panda(), joints=panda().joints[7:], limits=None, swing=None)
+    at = SetPoints(hand, np.zeros(2), np.zeros(2), 0.1)
+    at.after(np.array([0.01, 0.02]))
+    assert at.position.tolist() == [0.01, 0.02]
+
+
 def test_without_a_model_the_tool_is_refused() -> None:
     for answer in (Command(tool_change=np.zeros(6)), Command(tool=Pose())):
         with pytest.raises(PolicyError, match="inside the worker"):
