@@ -241,22 +241,23 @@ def test_what_is_seen() -> None:
     joints, told, bodies = (
         rng.normal(size=(2, 9)),
         rng.normal(size=(3, 9)),
-        rng.normal(size=(1, 13)),
+        rng.normal(size=(2, 13)),
     )
-    sight = Sight(SCENE, SERVO, Pose.at(1, 2, 3))
+    bodies_of = CUBE, replace(CUBE, name="other", pose=Pose.at(0.5, 0.2, 0.5))
+    sight = Sight(replace(SCENE, bodies=bodies_of), SERVO, Pose.at(1, 2, 3))
     state = np.frombuffer(written(0.5, joints, told, bodies))
     assert len(state) == sight.numbers
     seen = sight.read(state)
     assert seen.time == 0.5
     for found, right in (
         (seen.position, joints[0]), (seen.velocity, joints[1]), (seen.told, told),
-        (seen.bodies, bodies), (seen.twist("cube"), bodies[0, 7:]),
+        (seen.bodies, bodies), (seen.twist("other"), bodies[1, 7:]),
     ):  # fmt: skip
         assert np.array_equal(found, right)
     assert seen.goal == Pose.at(1, 2, 3)
     assert seen.pose("cube") == Pose.from_array(bodies[0])
     assert seen.tool == SERVO.tool_pose(joints[0])
-    with pytest.raises(PolicyError, match="'ball'; the free bodies are: cube"):
+    with pytest.raises(PolicyError, match="'ball'; the free bodies are: cube, other"):
         seen.pose("ball")
 
 
