@@ -84,6 +84,8 @@ def check_numbers(
 
 def check_pose(pose: Any, what: str) -> None:
     """A finite position, and a quaternion of unit length."""
+    if not hasattr(pose, "quaternion"):
+        raise SceneError(f"the pose of {what} is {pose!r:.80}; give a Pose")
     check_numbers(pose.position, 3, f"the position of {what}")
     check_numbers(pose.quaternion, 4, f"the quaternion of {what}")
     length = math.hypot(*pose.quaternion)

@@ -115,7 +115,7 @@ class SetPoints:
         arm = [robot.joint_names.index(joint.name) for joint in robot.arm_joints]
         self._arm = np.array(arm, dtype=int)
         self._driven = robot.column("stiffness") > FREE
-        self._motors = all(joint.motor for joint in robot.arm_joints)
+        self._motors = bool(arm) and all(joint.motor for joint in robot.arm_joints)
         if kinematics is not None:
             self.effort = kinematics.holding_effort(self.position)
 

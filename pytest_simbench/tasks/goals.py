@@ -142,8 +142,8 @@ class GoalTask(Task):
         success = self.reached(world, seed)
         count(int(success), 1)
         metrics = {"success": float(success), "distance": self.distance(world, seed)}
-        early = success and acted < self.seconds - 1e-6
-        ended = stayed.since - began if early and stayed.since is not None else None
+        since = stayed.since if success else None
+        ended = None if since is None or began + acted - since < HELD - 1e-9 else since - began
         return Outcome(
             {**metrics, "time": ended},
             {"goal": [*self.goal(seed).position], "acted": acted},

@@ -275,10 +275,10 @@ class Stacking(Task):
                 manipulator.place(place.pose.translated(z=self.release_height * self.scale))
         except (PlanningError, LostBody) as error:
             picks.fail(name, place, error)
+            if manipulator.held is not None:
+                picks.handled.add(name)
             with world.phase(f"recover from {where}"):
                 picks.note_motion(manipulator.recover())
-            if isinstance(error, LostBody):
-                picks.handled.add(name)
             return False
         pause = self.check_delay - manipulator.time_since_release()
         if self.count_after_retreat:

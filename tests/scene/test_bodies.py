@@ -170,6 +170,8 @@ def test_moments_of_its_own_must_be_possible() -> None:
     assert (UNIT.changed(mass=1.0, moments=(0.2, 0.3, 0.4)).inertia() == [0.2, 0.3, 0.4]).all()
     with pytest.raises(SceneError, match="none is larger than the other two"):
         Box("a", (1.0, 1.0, 1.0), Pose(), 1.0, moments=(0.1, 0.2, 0.4))
+    with pytest.raises(SceneError, match="the moments of inertia .* of 'a' is 0.0; .* above 0"):
+        Box("a", (1.0, 1.0, 1.0), Pose(), 1.0, moments=(0.1, 0.1, 0.0))
 
 
 SIZE = (0.3, 0.5, 0.2)

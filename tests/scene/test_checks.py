@@ -39,6 +39,7 @@ NAN, INF = math.nan, math.inf
         ({"pose": Pose((NAN, 0, 0))}, "the position of 'a' is nan"),
         ({"pose": Pose(quaternion=(0, 0, 0, 0))}, "quaternion of 'a' has the length 0; it must be"),
         ({"pose": Pose(quaternion=(NAN, 0, 0, 0))}, "the quaternion of 'a' is nan"),
+        ({"pose": (0, 0, 1)}, r"the pose of 'a' is \(0, 0, 1\); give a Pose"),
         ({"pose": Pose((0, 0))}, "the position of 'a' .* must be 3 numbers"),  # type: ignore[arg-type]
         ({"name": ""}, "a body has the name ''; give it a text"),
         ({"name": 3}, "a body has the name 3"),

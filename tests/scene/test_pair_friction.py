@@ -111,6 +111,16 @@ def test_what_touches_at_the_start_is_exact(rule: str) -> None:
     assert "ground and puck" not in problem
 
 
+def test_what_falls_has_its_friction_with_what_stands_still() -> None:
+    puck, falling = (
+        Box(name, (0.1,) * 3, Pose.at(x, 0, z), 1.0, mu)
+        for name, x, z, mu in (("puck", 0, 0.05, 0.9), ("falling", 2, 1, 0.5))
+    )
+    made, problem = combined(Scene("s", (puck, falling), ground_friction=0.2), "minimum")
+    assert of_pairs(made)[:2] == pytest.approx([0.9, 0.5])
+    assert "of puck and falling" in problem
+
+
 @pytest.mark.parametrize("rule", sorted(RULES))
 def test_a_block_between_ground_and_hand_has_both_its_frictions(rule: str) -> None:
     block = Box("block", (0.1,) * 3, Pose.at(0.5, 0, 0.05), 1.0, 0.3)

@@ -219,6 +219,14 @@ def test_a_robot_without_a_hand_is_moved_by_all_its_joints() -> None:
         at.after(Command(gripper=0.1))
 
 
+def test_a_hand_without_an_arm_is_moved_by_its_fingers() -> None:
+    """It was told that the joints of its arm are motors."""
+    hand = replace(panda(), joints=panda().joints[7:], limits=None, swing=None)
+    at = SetPoints(hand, np.zeros(2), np.zeros(2), 0.1)
+    at.after(np.array([0.01, 0.02]))
+    assert at.position.tolist() == [0.01, 0.02]
+
+
 def test_without_a_model_the_tool_is_refused() -> None:
     for answer in (Command(tool_change=np.zeros(6)), Command(tool=Pose())):
         with pytest.raises(PolicyError, match="inside the worker"):
@@ -233,22 +241,23 @@ def test_what_is_seen() -> None:
     joints, told, bodies = (
         rng.normal(size=(2, 9)),
         rng.normal(size=(3, 9)),
-        rng.normal(size=(1, 13)),
+        rng.normal(size=(2, 13)),
     )
-    sight = Sight(SCENE, SERVO, Pose.at(1, 2, 3))
+    bodies_of = CUBE, replace(CUBE, name="other", pose=Pose.at(0.5, 0.2, 0.5))
+    sight = Sight(replace(SCENE, bodies=bodies_of), SERVO, Pose.at(1, 2, 3))
     state = np.frombuffer(written(0.5, joints, told, bodies))
     assert len(state) == sight.numbers
     seen = sight.read(state)
     assert seen.time == 0.5
     for found, right in (
         (seen.position, joints[0]), (seen.velocity, joints[1]), (seen.told, told),
-        (seen.bodies, bodies), (seen.twist("cube"), bodies[0, 7:]),
+        (seen.bodies, bodies), (seen.twist("other"), bodies[1, 7:]),
     ):  # fmt: skip
         assert np.array_equal(found, right)
     assert seen.goal == Pose.at(1, 2, 3)
     assert seen.pose("cube") == Pose.from_array(bodies[0])
     assert seen.tool == SERVO.tool_pose(joints[0])
-    with pytest.raises(PolicyError, match="'ball'; the free bodies are: cube"):
+    with pytest.raises(PolicyError, match="'ball'; the free bodies are: cube, other"):
         seen.pose("ball")
 
 

@@ -222,6 +222,12 @@ def test_whole_numbers_are_numbers() -> None:
         assert rows.dtype == float
 
 
+def test_a_hand_squeezes_with_the_limit_of_its_drives() -> None:
+    robot = panda().squeezing(3.0)
+    assert robot.gripper.squeeze == 3.0
+    assert robot.column("effort_limit")[robot.finger_indices].tolist() == [3.0, 3.0]
+
+
 @given(st.integers(2, 50), TIMESTEPS)
 def test_it_ends_within_half_a_step_of_its_end(rows: int, timestep: float) -> None:
     """No step is left out or added, but that there is always one."""

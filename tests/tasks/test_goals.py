@@ -202,6 +202,24 @@ def test_what_a_policy_is_given_and_what_is_scored(monkeypatch: pytest.MonkeyPat
     assert [stays(one) for one in seen] == [False] * 5 + [True]
 
 
+def test_who_is_there_for_the_last_moment_alone_did_not_stay(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of 1.01 s, which are no whole periods, the policy has 1 s; it is there from 0.7 s on."""
+    task = PickAndPlace(limp, 1.01)
+    goal, world = task.goal(4), ScriptedWorld(ScriptedProcess(), task.scene(4, Jitter()))
+
+    def control(policy: Any, until: Any, **how: Any) -> None:
+        world.wait(0.7)
+        assert not until(SimpleNamespace(time=world.time, pose=lambda _: goal))
+        put("cube", goal)(world.process)
+        world.wait(0.3)
+
+    monkeypatch.setattr(world, "control", control)
+    metrics = task.perform(world, 4, lambda *count: None).metrics
+    assert (metrics["success"], metrics["time"]) == (1.0, None)
+
+
 @pytest.mark.engine
 def test_who_gets_there_succeeds_and_is_done_early(case: Case) -> None:
     record = performed(case, Reaching(to_the_goal, rate=10.0))

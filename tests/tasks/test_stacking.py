@@ -231,6 +231,21 @@ def test_a_cube_that_was_handled_is_not_untouched() -> None:
     assert on_the_way.metrics["placed"] == 1.0  # by the next cube
 
 
+def test_a_cube_that_the_hand_cannot_lift_was_handled() -> None:
+    """Something comes to hang over the closed hand, which puts the cube back."""
+    first = perform(ONE, says=False)[1].released[0][0]
+    above = ONE.scene(1, Jitter()).body(first).pose.translated(z=0.195)
+    outcome, _ = perform(
+        ONE,
+        Mishap("pick cube 1 of 1", 2.0, put("cube_21", above)),
+        Mishap("recover from cube 1 of 1", 0.0, put("cube_21", Pose.at(0.8, 0.3, 0.325))),
+        Mishap("settle", 1.0, move(first, x=-0.02)),
+        says=False,
+    )
+    assert "blocked" in outcome.reasons[0]
+    assert set(outcome.details["untouched_moved"]) == {"cube_21"}
+
+
 def test_a_cube_out_of_reach_stays_untouched() -> None:
     """Nobody handled it, so it counts when it moves."""
     first = perform(ONE)[1].released[0][0]
