@@ -92,7 +92,7 @@ def start(span: Span, metric: str, arguments: Sequence[str]) -> int:
         BadInput: a file of tests that is not there, told before releases are installed.
     """
     for path in (word.partition("::")[0] for word in arguments):
-        if path.endswith(".py") and not Path(path).exists():
+        if path.endswith(".py") and path[0] != "-" and not Path(path).exists():
             raise BadInput(f"there is no file {path}; name the file of the tests")
     releases = f"{span.name}:{span.good}..{span.bad}"
     own = [sys.modules[__name__]]  # tells the plugin who asks

@@ -7,6 +7,7 @@ to the last bit, whatever a planner would make of the cubes' poses there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -64,6 +65,13 @@ Tape = Sequence[Operation]
 """Operations in the order in which they were asked for."""
 
 
+LONGEST_TICK = 0.004
+"""Of what arrives late [s], that of planned motions."""
+
+AFTERWARDS = 1e-9
+"""So long after a motion the next one begins [s]; its efforts may be others."""
+
+
 class Latency:
     """A controller that is late: every set point reaches the drives `delay` [s] after it was sent.
 
@@ -73,42 +81,50 @@ class Latency:
 
     def __init__(self, delay: float) -> None:
         self.delay = delay
-        self._tick = 0.0
-        # Rows of `ARRAYS`, (3, n, n_joints): the one that acts now, and those on their way.
-        self._queue: FloatArray = np.empty((3, 0, 0))
-        self._asked: FloatArray = self._queue
+        self._now = self._until = 0.0
+        # When set points arrive [s], (n,), and rows of `ARRAYS`, (3, n, n_joints), linear between.
+        self._time: FloatArray = np.empty(0)
+        self._rows: FloatArray = np.empty((3, 0, 0))
 
-    def late(self, operation: Operation) -> list[Operation]:
+    def late(self, operation: Operation) -> Operation:
         """What the drives get to see while `operation` is asked for."""
-        if operation.kind == "follow":
-            rows = np.stack([operation.arguments[name] for name in ARRAYS])
-            if not self._queue.size:  # until the first motion arrives, the arm is held where it is
-                self._tick = float(operation.arguments["tick"])
-                self._queue = _held(rows[:, :1], 1 + round(self.delay / self._tick))
-            self._asked = rows[:, -1:]
-            # Row 0 of a trajectory is where the one before ended.
-            return [self._passed(rows[:, 1:], operation.phase)]
-        ticks = round(operation.duration / self._tick) if self._tick else 0
-        count = min(self._queue.shape[1] - 1, ticks)
-        if count <= 0:
-            return [operation]
-        late = self._passed(_held(self._asked, count), operation.phase)
-        rest = operation.duration - late.duration
-        if rest < self._tick / 2:
-            return [late]
-        return [late, Operation("wait", {"duration": rest}, operation.phase)]
+        told, duration, follows = operation.arguments, operation.duration, operation.kind != "wait"
+        began, arrives = self._now, self._now + self.delay
+        if not (follows or self._time.size):
+            return operation
+        rows = np.stack([told[name] for name in ARRAYS]) if follows else _held(self._rows[:, -1:])
+        if not self._time.size:  # until the first motion arrives, the arm is held where it is
+            self._time, self._rows = np.array([began, arrives]), _held(rows[:, :1])
+        sent = np.linspace(0.0, duration, rows.shape[1]).clip(AFTERWARDS)
+        self._time = np.append(self._time, arrives + sent)
+        self._rows = np.concatenate([self._rows, rows], axis=1)
+        self._now = began + duration
+        late = operation
+        if follows or began < self._until:
+            ticks = rows.shape[1] - 1
+            ticks *= math.ceil(duration / max(1, ticks) / LONGEST_TICK - 1e-6)
+            found = self._at(np.linspace(began, self._now, ticks + 1))
+            motion = {name: value for name, value in told.items() if name == "striking"}
+            motion |= {"tick": duration / max(1, ticks) or LONGEST_TICK}
+            motion |= zip(ARRAYS, found, strict=True)
+            late = Operation("follow", motion, operation.phase)
+        if follows:
+            self._until = arrives + duration
+        kept = int(np.searchsorted(self._time, self._now, "right")) - 1
+        self._time, self._rows = self._time[kept:], self._rows[:, kept:]
+        return late
 
-    def _passed(self, rows: FloatArray, phase: str) -> Operation:
-        """The motion of so many of the oldest rows, once these have joined the others."""
-        queue, count = np.concatenate([self._queue, rows], axis=1), rows.shape[1]
-        self._queue = queue[:, count:]
-        motion = dict(zip(ARRAYS, queue[:, : count + 1], strict=True))
-        return Operation("follow", {"tick": self._tick, **motion}, phase)
+    def _at(self, time: FloatArray) -> FloatArray:
+        """The set points of these moments [s], before the last one that is known."""
+        below = np.searchsorted(self._time, time, "right") - 1
+        first, last = self._time[below], self._time[below + 1]
+        share = ((time - first) / (last - first))[:, None]
+        return self._rows[:, below] * (1 - share) + self._rows[:, below + 1] * share
 
 
-def _held(row: FloatArray, count: int) -> FloatArray:
-    """A set point, (3, 1, n_joints), to stay at."""
-    held = np.repeat(row, count, axis=1)
+def _held(row: FloatArray) -> FloatArray:
+    """A set point, (3, 1, n_joints), to stay at from one moment to another."""
+    held = np.repeat(row, 2, axis=1)
     held[ARRAYS.index("velocity")] = 0.0
     return held
 
@@ -157,11 +173,11 @@ class TapedWorld(World):
         if self._before is not None:
             self._before(self, wanted)
         self.tape.append(wanted)
-        begun, late = len(self.trace), self._latency.late(wanted) if self._latency else [wanted]
-        found = [self.perform(part, log_period) for part in late]
+        begun, late = len(self.trace), self._latency.late(wanted) if self._latency else wanted
+        found = self.perform(late, log_period)
         if self._trace_period is not None:
             self.motions.append(self._kept(begun))
-        return Motion.joined(found or [self._still()])
+        return found
 
     def perform(self, operation: Operation, log_period: float | None = None) -> Motion:
         """Carry out one operation without putting it on the tape."""

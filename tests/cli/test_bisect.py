@@ -67,3 +67,11 @@ def test_a_test_with_two_tasks(tmp_path: Path) -> None:
     assert replace(alone, metric_name="crashed").metric().name == "crashed"
     with pytest.raises(BadInput, match="no metric is named 'nosuch'"):
         replace(alone, metric_name="nosuch").metric()
+
+
+def test_an_option_with_a_file_is_no_file_of_tests(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr(pytest, "main", lambda words, plugins: asked.append((words, plugins)) or 3)
+    words = ["tests", "--ignore=gone.py", "--policies=mine.py:walk"]
+    assert bisect.start(Span("sim", "1.8", "1.12"), "landed", words) == 3
+    assert asked == [([*words, "--sim-bisect", "sim:1.8..1.12", "landed"], [bisect])]

@@ -172,28 +172,29 @@ LOW = SCENE.with_pose("a", Pose.at(0.0, 0.0, 0.2))
 TICK = 0.004
 
 
-def ramp(start: float, end: float, rows: int) -> Operation:
+def ramp(start: float, end: float, rows: int, tick: float = TICK) -> Operation:
     """One joint from start to end."""
     position = np.linspace(start, end, rows)[:, None]
-    velocity = np.full((rows, 1), (end - start) / (TICK * (rows - 1)))
+    velocity = np.full((rows, 1), (end - start) / (tick * (rows - 1)))
     velocity[-1] = 0.0
     arrays = {"position": position, "velocity": velocity, "effort": 10 * position}
-    return Operation("follow", {"tick": TICK, **arrays}, "move")
+    return Operation("follow", {"tick": tick, **arrays}, "move")
 
 
 def wait(duration: float) -> Operation:
     return Operation("wait", {"duration": duration}, "rest")
 
 
-def heard(operations: list[Operation], asked_last: float = 0.0) -> np.ndarray:
-    """Set points tick by tick, as the drives get them."""
+def heard(operations: list[Operation]) -> np.ndarray:
+    """Set points each `TICK`, as the drives get them."""
     points: list[float] = []
     for operation in operations:
+        at = TICK * np.arange(1, 1 + round(operation.duration / TICK))
         if operation.kind == "wait":
-            held = points[-1] if points else asked_last
-            points += [held] * round(operation.duration / TICK)
+            points += [points[-1]] * len(at)
         else:
-            points += list(operation.arguments["position"][1:, 0])
+            rows = operation.arguments["position"][:, 0]
+            points += [*np.interp(at, operation.arguments["tick"] * np.arange(len(rows)), rows)]
     return np.array(points)
 
 
@@ -202,37 +203,52 @@ def heard(operations: list[Operation], asked_last: float = 0.0) -> np.ndarray:
     parts=st.lists(st.one_of(st.integers(1, 40), st.integers(-60, -1)), min_size=1, max_size=8),
 )
 def test_late_commands_are_the_same_commands_later(delay: int, parts: list[int]) -> None:
-    """Positive parts are motions of so many ticks, negative ones waits. What the drives get is
-    what was asked for, shifted, and takes as long."""
-    latency, asked, late = Latency(delay * TICK), [], []
-    at = 0.0
+    """Positive parts are motions of so many ticks, each tenth one of a single long one; negative
+    ones waits. What the drives get is what was asked for, shifted, and takes as long."""
+    latency, asked, at = Latency(delay * TICK), list[Operation](), 0.0
     for number, part in enumerate([20, *parts]):
         if part > 0:
-            asked.append(ramp(at, number + 1.0, part + 1))
+            rows = 2 if part % 10 == 0 else part + 1
+            asked.append(ramp(at, number + 1.0, rows, TICK * part / (rows - 1)))
             at = number + 1.0
         else:
             asked.append(wait(-part * TICK))
-        late += (sent := latency.late(asked[-1]))
-        assert {one.phase for one in sent} == {asked[-1].phase}
-    wanted, got = heard(asked), heard(late)
-    assert len(got) == len(wanted)
+    late = [*map(latency.late, asked)]
+    assert [one.phase for one in late] == [one.phase for one in asked]
+    assert [one.duration for one in late] == pytest.approx([one.duration for one in asked])
+    wanted = heard(asked)
     shifted = np.concatenate([np.zeros(delay), wanted])[: len(wanted)]
-    assert got == pytest.approx(shifted)
+    assert heard(late) == pytest.approx(shifted)
 
 
 def test_every_row_goes_with_its_velocity_and_effort() -> None:
     latency = Latency(2 * TICK)
     first = ramp(0.0, 1.0, 11)
-    (late,) = latency.late(first)
-    assert late.kind == "follow"
+    late = latency.late(first)
     for name in ARRAYS:
-        assert np.array_equal(late.arguments[name][3:], first.arguments[name][1:-2])
+        assert late.arguments[name][3:] == pytest.approx(first.arguments[name][1:-2])
     assert not late.arguments["velocity"][:3].any()  # held until the first set point arrives
+    end = latency.late(Operation("wait", {"duration": 0.0, "striking": True}))
+    assert end.arguments.keys() == {"tick", "striking", *ARRAYS}  # the task still knows of a blow
+    assert end.arguments["effort"] == pytest.approx(first.arguments["effort"][-3:-2])
+
+
+def test_a_delay_is_no_whole_number_of_ticks_and_an_effort_ends_at_once() -> None:
+    pushed = np.zeros((3, 2, 1))
+    pushed[2] = 7.0
+    latency = Latency(TICK / 4)
+    ends = []
+    for rows in (pushed, 0 * pushed):
+        motion = dict(zip(ARRAYS, rows, strict=True))
+        ends.append(latency.late(Operation("follow", {"tick": 0.5, **motion})).arguments["effort"])
+    assert [one.ravel()[[0, 1, 2, -1]].tolist() for one in ends] == [[7.0] * 4, [7.0, 0, 0, 0]]
+    late = latency.late(ramp(0.0, 1.0, 5)).arguments["position"]
+    assert late.ravel() == pytest.approx([0.0, 0.1875, 0.4375, 0.6875, 0.9375])
 
 
 def test_before_the_first_motion_nothing_is_late() -> None:
     asked = wait(1.0)
-    assert Latency(0.02).late(asked) == [asked]
+    assert Latency(0.02).late(asked) is asked
 
 
 def test_playing_a_tape_repeats_the_episode(handle: SimulatorHandle) -> None:

@@ -213,6 +213,12 @@ def test_a_scene_that_cannot_be_simulated_is_told_with_the_first_reason() -> Non
     with pytest.raises(TuningError, match=rf"^no value can be run: {299 * 'a'}\?$"):
         fit(["spring:slider"], motion=none, failures=failures)
 
+    def alone(of: Mapping[str, float], start: float) -> FloatArray:
+        return swing(of, start) * (1.0 if abs(of["spring:slider"] - 90.0) < 1e-9 else math.nan)
+
+    with pytest.raises(TuningError, match="^the scene cannot be simulated beside the best values$"):
+        fit(["spring:slider"], motion=alone)
+
 
 class Known(Fit):
     """Of two unknowns, of which it is known how far each joint is off; it keeps where it looked."""
@@ -239,4 +245,5 @@ def test_an_interval_is_tried_out_towards_the_farther_end(
     assert one.seen[1:] == pytest.approx(tried)
     columns = {"a": np.array([3e-3, 4e-3]), "b": np.array([[5e-4]]), "c": np.full(3, 1.5e-3)}
     assert one.misfit(columns) == pytest.approx({"a": math.sqrt(12.5)})
+    assert one._cost({"a": np.full(2, NOISE)}) - one._cost({"a": np.zeros(2)}) == 1.0
     assert [one._inside(1, x) for x in (-2.01, -2, 3, 3.01)] == [False, True, True, False]

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.cli.tune import _judge
-from pytest_simbench.cli.tune_told import Result, profile_of, verdict_of
+from pytest_simbench.cli.tune_told import Result, profile_of, together, verdict_of
 from pytest_simbench.experiment.identity import settings
 from pytest_simbench.laws import LAWS
 from pytest_simbench.tuning.search import front
@@ -48,8 +48,8 @@ def test_what_a_command_line_names() -> None:
     assert order[:4] == [("creep", 1), ("grip_holds", 1), ("throwing", 1), ("stacking", 1)]
     assert order[-4:] == [(name, k) for name in ("throwing", "stacking") for k in (2, 3)]
     assert len([look for look in found.judged if look.task.name == "stacking"]) == 9
-    assert (found.word, found.laws, found.unit) == (
-        "several", False, "margins",
+    assert (found.name[:8], found.word, found.laws, found.unit) == (
+        "throwing", "several", False, "margins",
     )  # fmt: skip
     for alone, error in (("stacking", "at_end_strict"), ("stacking:at_end_strict,", None)):
         one = named(alone, "cpu_cost", error, 3, 9)
@@ -57,6 +57,8 @@ def test_what_a_command_line_names() -> None:
     assert named("stacking:converged:placed", "cpu_cost", None, 3, 9).converged
     found = named("laws,stacking", "cpu_cost", None, 3, 9)
     assert [look.task.name for look in found.chosen[:-3]] == [law.name for law in LAWS]
+    found = named("laws,stacking", "cpu_cost", None, 3, 9, ())  # laws that ask for nothing
+    assert [look.task.name for look in found.chosen[:-3]] == [o.name for o in LAWS if not o.needs]
 
 
 @pytest.mark.parametrize(
@@ -131,6 +133,7 @@ def test_the_verdict_is_that_of_the_worst(tmp_path: Path) -> None:
         halves = _judge(looks, today, one, 1e4 if one is lost else 30.0)
         result = Result(looks, [today, one], one, "it is cheaper", halves)
         lines += [*verdict_of(result), f"{getattr(result.judgement, 'after', None):g}"]
+    lines += [*together([result])]
     lines += [line for line in profile_of(result).splitlines() if "seeds" in line or "by" in line]
     assert_approved("several", "\n".join(lines))
 

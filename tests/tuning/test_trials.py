@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 
 from pytest_simbench.client.errors import SceneRefused, Where
+from pytest_simbench.laws import LAWS
 from pytest_simbench.records.record import Failure
 from pytest_simbench.scene.policy import LoopError
-from pytest_simbench.tuning.target import FIRST_CHOSEN, FIRST_JUDGED, TuningError
-from pytest_simbench.tuning.trials import Candidate
+from pytest_simbench.tuning.target import FIRST_CHOSEN, FIRST_JUDGED, Look, TuningError
+from pytest_simbench.tuning.trials import Candidate, least_costs
 
 from .made_up import target, trials
 
@@ -26,6 +27,12 @@ def test_cost_and_error_are_those_of_the_records(tmp_path: Path) -> None:
     assert executor.asked == [("today", k) for k in (1, 2, 3, 4)]
     seeds = [(r.seed, r.settings["timestep"]) for r in looks.runs.folder.own]
     assert seeds[0] == (300_001, 0.002)
+
+
+def test_of_several_looks_at_a_law_the_least_cost_counts() -> None:
+    costs = {Look(LAWS[0], number): cost for number, cost in enumerate((3.0, 1.0, 2.0), 1)}
+    assert least_costs(costs) == {Look(LAWS[0]): 1.0}
+    assert Candidate("today", {}, costs=costs).cost() == 1.0
 
 
 def test_others_may_take_four_times_as_long_as_todays_longest(tmp_path: Path) -> None:
