@@ -95,6 +95,14 @@ def test_what_stands_in_a_wall_and_what_falls_are_told() -> None:
     assert fallen.reasons == ("peg is not in the hand",)
 
 
+def test_who_lost_the_peg_before_keeps_nothing_out() -> None:
+    """Else a hand that holds nothing would do best."""
+    fallen = inserted(Oversized(), Mishap("bring", 0.2, slip(x=0.05)))
+    assert (set(fallen.metrics.values()), fallen.reasons) == ({None}, ("peg is not in the hand",))
+    pressed = inserted(Oversized(), Mishap("insert", 0.1, slip(z=-0.05)))
+    assert pressed.metrics["inserted"] == 0.0
+
+
 @pytest.mark.parametrize("kind", [Inserting, Oversized])
 def test_a_clearance_is_judged_from_three_times_what_is_added(kind: type[Inserting]) -> None:
     task = kind()
