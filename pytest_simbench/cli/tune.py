@@ -172,10 +172,13 @@ def _search(
         halves = _judge(looks, done[0], best, (1 - SEARCHING) * budget)
         result = Result(looks, done, best, why, halves)
         print(for_terminal("\n".join(["", *front_of(result), "", *verdict_of(result)])))
-        if best is not done[0]:
-            with refusing(OSError, str(path)):
-                write_whole(path, f"{name}.tuned.toml", profile_of(result).encode())
-            print(f"profile: {shown(path / f'{name}.tuned.toml', Path.cwd())}")
+        file = path / f"{name}.tuned.toml"
+        with refusing(OSError, str(path)):
+            if best is not done[0]:
+                write_whole(path, file.name, profile_of(result).encode())
+                print(f"profile: {shown(file, Path.cwd())}")
+            elif not (case.file and file.exists() and file.samefile(case.file.path)):
+                file.unlink(missing_ok=True)  # of an earlier call, with less budget
         today, *points = [(c.cost(), looks.error(c)) for c in (done[0], *finished(done))]
         line = [(c.cost(), looks.error(c)) for c in front(done, looks)]
         picture = Picture("front", partial(draw, points, line, today, wanted.cost, wanted.unit))

@@ -69,6 +69,8 @@ def test_a_grip_that_creeps(
     (tmp_path / "out/front.png").mkdir()
     assert main([*SLIPS, *few, "--trials", "8"]) == 2
     assert "Is a directory" in capsys.readouterr().err
+    assert main([*SLIPS, *few, "--trials", "1"]) == 2  # today's alone: nothing else is recommended
+    assert not (tmp_path / "out/mujoco.tuned.toml").exists()
 
 
 def test_how_many_seeds_are_judged_and_on_which_it_was_chosen(
@@ -118,6 +120,9 @@ def test_all_that_is_said_of_a_search(tmp_path: Path, capsys: pytest.CaptureFixt
     lines = [capsys.readouterr().out, *together((better, unknown, kept))]
     for of in (better, unknown, kept, law, replace(kept, done=[today])):
         lines += [*front_of(of), *verdict_of(of)]
+    for cpu, record in zip(("slow", "quick"), today.records.values(), strict=False):
+        vars(record)["host"] = {"cpu": cpu, "node": cpu}
+    lines += verdict_of(kept)
     assert_approved("tune", "\n".join(lines))
 
 
