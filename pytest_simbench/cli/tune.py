@@ -197,6 +197,6 @@ def _judge(trials: Trials, today: Candidate, found: Candidate, seconds: float) -
         for one, record in chain(today.records.items(), found.records.items()):
             took.setdefault(one.task.name, []).append(record.cost("total") or 0.1)
         each = (2 + FINER * trials.target.converged) * sum(map(fmean, took.values()))
-        many = max(FEWEST_JUDGED, int(seconds * trials.runs.executor.jobs / each))
+        many = max(FEWEST_JUDGED, int(seconds * trials.runs.executor.slots / each))
         looks = tuple(look for look in looks if look.number < looks[0].number + many)
     return trials.judge(today, found, looks=looks)
