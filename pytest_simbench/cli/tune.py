@@ -73,12 +73,16 @@ def tune(
     names, builds = read_names(known() if EVERY in sim else dict.fromkeys(sim), Path.cwd())
     several, results, left = len(names) > 1, [], []
     with _executor(jobs, cluster) as (executor, nodes):
-        for name in names:
-            out = Path(output, name if several else "") if output else None
-            chosen = Selection(
+        selected = {
+            name: Selection(
                 (name,), ("headless",), labels, pythons=builds, nodes=nodes, named=(name,),
                 files=files,
-            )  # fmt: skip
+            )
+            for name in names
+        }  # fmt: skip
+        many = sum(not chosen.unusable(name) for name, chosen in selected.items())
+        for name, chosen in selected.items():
+            out = Path(output, name if several else "") if output else None
             options = [
                 f"--sim-name={'='.join(filter(None, (name, builds.get(name))))}",
                 f"--sim-profile={(profile or labels)[0]}",
@@ -87,7 +91,7 @@ def tune(
             if several:
                 print(f"\n{name}", flush=True)
             try:
-                seconds = (budget or BUDGET) / len(names)
+                seconds = (budget or BUDGET) / max(1, many)  # of those that are here
                 done = _search(chosen, executor, target, options, seconds, out, **more)
             except (BadInput, SimulatorError) as problem:
                 if not several:
