@@ -196,7 +196,8 @@ def profiles_of(asked: Sequence[str]) -> tuple[tuple[str, ...], dict[str, Profil
     """
     found = [read_profile(name) if name.endswith(ENDING) else name for name in asked]
     files = {one.label: one for one in found if isinstance(one, ProfileFile)}
-    return tuple(one if isinstance(one, str) else one.label for one in found), files
+    labels = (one if isinstance(one, str) else one.label for one in found)
+    return tuple(dict.fromkeys(labels)), files  # two files may say the same
 
 
 def robots_of(text: str | Path | None, where: str = "--robot") -> Mapping[str, Robot | None]:

@@ -73,12 +73,16 @@ def tune(
     names, builds = read_names(known() if EVERY in sim else dict.fromkeys(sim), Path.cwd())
     several, results, left = len(names) > 1, [], []
     with _executor(jobs, cluster) as (executor, nodes):
-        for name in names:
-            out = Path(output, name if several else "") if output else None
-            chosen = Selection(
+        selected = {
+            name: Selection(
                 (name,), ("headless",), labels, pythons=builds, nodes=nodes, named=(name,),
                 files=files,
-            )  # fmt: skip
+            )
+            for name in names
+        }  # fmt: skip
+        many = sum(not chosen.unusable(name) for name, chosen in selected.items())
+        for name, chosen in selected.items():
+            out = Path(output, name if several else "") if output else None
             options = [
                 f"--sim-name={'='.join(filter(None, (name, builds.get(name))))}",
                 f"--sim-profile={(profile or labels)[0]}",
@@ -87,7 +91,7 @@ def tune(
             if several:
                 print(f"\n{name}", flush=True)
             try:
-                seconds = (budget or BUDGET) / len(names)
+                seconds = (budget or BUDGET) / max(1, many)  # of those that are here
                 done = _search(chosen, executor, target, options, seconds, out, **more)
             except (BadInput, SimulatorError) as problem:
                 if not several:
@@ -172,10 +176,13 @@ def _search(
         halves = _judge(looks, done[0], best, (1 - SEARCHING) * budget)
         result = Result(looks, done, best, why, halves)
         print(for_terminal("\n".join(["", *front_of(result), "", *verdict_of(result)])))
-        if best is not done[0]:
-            with refusing(OSError, str(path)):
-                write_whole(path, f"{name}.tuned.toml", profile_of(result).encode())
-            print(f"profile: {shown(path / f'{name}.tuned.toml', Path.cwd())}")
+        file = path / f"{name}.tuned.toml"
+        with refusing(OSError, str(path)):
+            if best is not done[0]:
+                write_whole(path, file.name, profile_of(result).encode())
+                print(f"profile: {shown(file, Path.cwd())}")
+            elif not (case.file and file.exists() and file.samefile(case.file.path)):
+                file.unlink(missing_ok=True)  # of an earlier call, with less budget
         today, *points = [(c.cost(), looks.error(c)) for c in (done[0], *finished(done))]
         line = [(c.cost(), looks.error(c)) for c in front(done, looks)]
         picture = Picture("front", partial(draw, points, line, today, wanted.cost, wanted.unit))
@@ -194,6 +201,6 @@ def _judge(trials: Trials, today: Candidate, found: Candidate, seconds: float) -
         for one, record in chain(today.records.items(), found.records.items()):
             took.setdefault(one.task.name, []).append(record.cost("total") or 0.1)
         each = (2 + FINER * trials.target.converged) * sum(map(fmean, took.values()))
-        many = max(FEWEST_JUDGED, int(seconds * trials.runs.executor.jobs / each))
+        many = max(FEWEST_JUDGED, int(seconds * trials.runs.executor.slots / each))
         looks = tuple(look for look in looks if look.number < looks[0].number + many)
     return trials.judge(today, found, looks=looks)

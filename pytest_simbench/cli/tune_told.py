@@ -95,6 +95,10 @@ def verdict_of(of: Result) -> Iterator[str]:
     """The recommendation, and what the held-out half says of it."""
     kept = of.found is of.done[0]
     yield f"recommended: {'today' if kept else of.found.name}: {of.why}"
+    found = [record for one in (*of.done, *of.halves) for record in one.records.values()]
+    if len(cpus := {str(record.host["cpu"]) for record in found if "cpu" in record.host}) > 1:
+        kinds = ", ".join(sorted(cpus))
+        yield f"costs do not compare: they are of several processors ({kinds}); take one kind"
     if (judgement := of.judgement) is None:
         if not kept:
             yield "not judged: there are no other parameters of these laws, or no other starts"
@@ -138,6 +142,7 @@ def profile_of(of: Result) -> str:
     """The text of the profile file."""
     target, case, found = of.trials.target, of.trials.case, of.found
     chosen: dict[str, Any] = {"by": f"simbench tune {target.name}", "reason": of.why}
+    chosen["held_out"] = of.judgement.verdict if of.judgement else "not judged"
     before = case.file.chosen_on if case.file else ()
     seeds = [[one.task, one.first, one.last] for one in before]
     motions = {}

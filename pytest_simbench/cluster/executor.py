@@ -86,7 +86,11 @@ class ClusterExecutor(Executor):
     @property
     def jobs(self) -> int:
         """More than there are slots: those without one wait for it."""
-        return min(MOST_AT_ONCE, ROOM + 2 * sum(node.slots for node in self.pool.nodes()))
+        return min(MOST_AT_ONCE, ROOM + 2 * self.slots)
+
+    @property
+    def slots(self) -> int:
+        return sum(node.slots for node in self.pool.nodes()) or 1
 
     def repetition(
         self, experiment: Experiment, number: int, hooks: Hooks | None = None

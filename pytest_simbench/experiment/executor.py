@@ -31,6 +31,11 @@ class Executor(ABC):
     def jobs(self) -> int:
         """Repetitions side by side, at most."""
 
+    @property
+    def slots(self) -> int:
+        """How many of these do not wait for another one's end."""
+        return self.jobs
+
     @abstractmethod
     def repetition(
         self, experiment: Experiment, number: int, hooks: Hooks | None = None

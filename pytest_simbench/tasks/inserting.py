@@ -62,7 +62,7 @@ ABOVE, STEP, SLOW = 0.005, 0.002, 0.3
 """From where the peg is lowered, above the chamfer, and about how far at a time [m]; at which share
 of the joints' speed limits."""
 
-JUDGED = 3.0
+JUDGED, NOT_JUDGED = 3.0, "not judged"
 
 BLUE, STEEL = (0.3, 0.45, 0.75, 1.0), (0.7, 0.72, 0.75, 1.0)
 
@@ -189,7 +189,7 @@ class Inserting(Task):
             return Outcome(
                 dict.fromkeys([metric.name for metric in self.metrics]),
                 reasons=(
-                    f"not judged: of a clearance of {1000 * self.clearance:g} mm the engine's "
+                    f"{NOT_JUDGED}: of a clearance of {1000 * self.clearance:g} mm the engine's "
                     f"shapes and the facets of the hole make {1000 * added:.2g} mm",
                 ),
             )
@@ -221,17 +221,19 @@ class Inserting(Task):
         pose = world.pose("peg")
         *beside, depth = np.subtract((*HOLE, HIGH), (pose * Pose.at(0.0, 0.0, -LONG / 2)).position)
         inserted = not reasons and depth > 0.8 * self.depth
-        judged = there or self.references["inserted"]  # who does not get there keeps no peg out
         count(int(inserted), 1)
+        names = [metric.name for metric in self.metrics]
+        if not (there or self.references["inserted"]):  # who does not press keeps nothing out
+            return Outcome(dict.fromkeys(names), reasons=tuple(reasons))
         peg = self.peg(Pose()).moved_to(pose)
         found: dict[str, float | None] = {
-            "inserted": float(inserted) if judged else None,
+            "inserted": float(inserted),
             "depth": 1000 * float(depth) if np.hypot(*beside) < WIDE / 2 else None,
             "overlap": 1000 * max(0.0, *(penetration(peg, body) for body in self.hole())),
             "force": max(forces, default=None),
         }
         return Outcome(
-            {metric.name: found[metric.name] for metric in self.metrics},
+            {name: found[name] for name in names},
             {"aside": aside.tolist(), "forces": forces, "added": added},
             reasons=tuple(reasons),
         )

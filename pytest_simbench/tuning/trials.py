@@ -156,7 +156,7 @@ class Trials:
         for one in (*self._finer(""), found):
             for _ in self._looks(one, looks):
                 times = [record.cost("total") or 0.0 for record in found.records.values()]
-                jobs = self.runs.executor.jobs  # so many were had at once
+                jobs = self.runs.executor.slots  # so many were had at once
                 if seconds < FEWEST * sum(times) / jobs:
                     whole = len(looks) * sum(times) / len(times) / jobs
                     raise TuningError(
@@ -193,7 +193,7 @@ class Trials:
         """The candidates on the half that they were not chosen on; in turns, so that a machine that
         slows down slows all."""
         found = [Candidate(one.name, one.changes, "held_out") for one in candidates]
-        jobs = self.runs.executor.jobs
+        jobs = self.runs.executor.slots
         for part in (looks[k : k + jobs] for k in range(0, len(looks), jobs)):
             for one in (*self._finer("held_out"), *found):
                 for _ in self._looks(one, part):
@@ -227,7 +227,7 @@ class Trials:
     def _looks(self, found: Candidate, looks: Sequence[Look]) -> Iterator[Look]:
         """Have a candidate's looks, one after the other."""
         ahead: dict[Look, Record] = {}
-        jobs = self.runs.executor.jobs
+        jobs = self.runs.executor.slots
         for k, look in enumerate(looks):
             if look not in ahead:
                 batch = [one for one in looks[k : k + jobs] if one.task is look.task]

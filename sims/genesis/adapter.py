@@ -344,7 +344,7 @@ class Genesis(Simulator):
         return np.array(numbers(picture)[..., :3], dtype=np.uint8)
 
     def refresh_window(self) -> None:
-        if self.gui:
+        if self.gui and self.world.viewer.is_alive():  # else the user has closed it
             self.world.visualizer.update(force=True)
 
     def close(self) -> None:

@@ -138,7 +138,8 @@ class Drawing:
             self._viewer.set_scene(self._world)
             self._viewer.window.set_camera_parameters(NEAR, FAR, FIELD_OF_VIEW)
             self._viewer.set_camera_pose(_looking())
-        self._viewer.render()
+        if not self._viewer.closed:
+            self._viewer.render()
 
     def close(self) -> None:
         """Close the window."""

@@ -26,3 +26,13 @@ def test_the_profile_then_ours_then_the_user_s(name: str, ratio: str, tmp_path: 
     case = chosen.case(variant, ours, test="t", folder=Path())
     assert (case.mode, case.own_timestep, case.base) == ("gui", 0.004, "tuned")
     assert case.changes == {**ours, "timestep": 0.008, "impratio": ratio, "cone": "pyramidal"}
+
+
+def test_two_files_that_say_the_same_are_one_profile(tmp_path: Path) -> None:
+    """One file by two paths, say."""
+    paths = [tmp_path / "quick.toml", tmp_path / "sub" / "quick.toml"]
+    paths[1].parent.mkdir()
+    for path in paths:
+        path.write_text('simulator = "mujoco"\n')
+    labels, files = profiles_of([*map(str, paths), "tuned"])
+    assert labels == (*files, "tuned")

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from pytest_simbench.cli import tune as cli_tune
 from pytest_simbench.cli.main import main
 from pytest_simbench.cli.runs import RUNS
 from pytest_simbench.cli.tune import _judge
@@ -25,6 +26,7 @@ from pytest_simbench.cli.tune_told import (
     together,
     verdict_of,
 )
+from pytest_simbench.cli.values import BadInput
 from pytest_simbench.measure.intervals import Interval
 from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.simulator.profile_file import read_profile
@@ -69,6 +71,8 @@ def test_a_grip_that_creeps(
     (tmp_path / "out/front.png").mkdir()
     assert main([*SLIPS, *few, "--trials", "8"]) == 2
     assert "Is a directory" in capsys.readouterr().err
+    assert main([*SLIPS, *few, "--trials", "1"]) == 2  # today's alone: nothing else is recommended
+    assert not (tmp_path / "out/mujoco.tuned.toml").exists()
 
 
 def test_how_many_seeds_are_judged_and_on_which_it_was_chosen(
@@ -118,6 +122,9 @@ def test_all_that_is_said_of_a_search(tmp_path: Path, capsys: pytest.CaptureFixt
     lines = [capsys.readouterr().out, *together((better, unknown, kept))]
     for of in (better, unknown, kept, law, replace(kept, done=[today])):
         lines += [*front_of(of), *verdict_of(of)]
+    for cpu, record in zip(("slow", "quick"), today.records.values(), strict=False):
+        vars(record)["host"] = {"cpu": cpu, "node": cpu}
+    lines += verdict_of(kept)
     assert_approved("tune", "\n".join(lines))
 
 
@@ -151,6 +158,21 @@ def test_a_test_on_several_simulators(
     assert {(r["function"], r["task"]) for r in made} == {("tune_test_falls", "falling")}
     assert all(r["contended"] for r in made)
     assert (Path("out/mujoco/records.jsonl").exists(), Path("out/pybullet").exists()) == (1, 0)
+
+
+def test_who_is_not_here_takes_no_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
+    given: list[float] = []
+
+    def search(chosen: object, executor: object, target: str, options: object, seconds: float,
+               out: object) -> None:  # fmt: skip
+        given.append(seconds)
+        raise BadInput("it is not here")
+
+    monkeypatch.setattr(cli_tune, "_search", search)
+    with pytest.raises(BadInput, match="^none of 2 simulators could be tuned$"):
+        cli_tune.tune("stacking", ["mujoco", "mujoco==0.0.1"], budget=60.0)
+    assert given == [60.0, 60.0]
 
 
 def test_a_test_that_was_edited_is_searched_for_anew(
