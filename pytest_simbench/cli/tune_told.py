@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from pytest_simbench.experiment.identity import settings
 from pytest_simbench.ground.text import for_terminal
 from pytest_simbench.ground.versions import base_name
 from pytest_simbench.measure.intervals import Interval
@@ -82,10 +83,11 @@ def front_of(of: Result) -> Iterator[str]:
         f"{len(done) - 1} candidates: {len(ended) - hopeless} failed, {hopeless} were stopped as "
         f"hopeless; cost is {trials.target.cost}"
     )
-    rows = [("", "cost", "error", "settings")]
+    rows, own = [("", "cost", "error", "settings")], settings(trials.case)
     for one in [*best, *([] if today in best else [today])]:
         mark = "recommended" if one is of.found else "today" if one is today else ""
-        changed = (f"{key}={in_words(value)}" for key, value in one.changes.items())
+        others = {key: value for key, value in one.changes.items() if value != own.get(key)}
+        changed = (f"{key}={in_words(value)}" for key, value in others.items())
         error = significant(trials.error(one))
         rows.append((mark, significant(one.cost()), error, " ".join(changed) or "today's"))
     yield from aligned(rows)

@@ -29,7 +29,7 @@ def replay_file(
         )
         screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
         if example.case.mode == "gui" and not screen:
-            raise ExampleError("there is no display for a window; try xvfb-run")
+            raise ExampleError("there is no display for a window; try xvfb-run -s -noreset")
         try:
             _replay(example)
         except WorkerError as error:

@@ -160,7 +160,7 @@ def window_changes_nothing(subject: Subject) -> None:
     """With a window the same is computed, bit for bit where determinism is claimed, else within
     1 mm. Skipped where there is no display."""
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        pytest.skip("no display; start one, e.g. with xvfb-run")
+        pytest.skip("no display; start one, e.g. with xvfb-run -s -noreset")
     runs = [swung(subject, fresh=True, gui=gui) for gui in (False, True)]
     if subject.can(Capability.DETERMINISTIC):
         require_same("with and without a window", runs[1], runs[0])

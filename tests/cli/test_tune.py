@@ -110,7 +110,7 @@ def test_all_that_is_said_of_a_search(tmp_path: Path, capsys: pytest.CaptureFixt
     today = looks.today()
     done, tell = [today], progress(looks)
     for number, step in enumerate((0.003, 0.015, 0.001, 0.008, *[0.0029] * 7), 1):
-        more = {"cone": "elliptic"} if step == 0.008 else {}
+        more = {"cone": "elliptic", "impratio": 1.0} if step == 0.008 else {}  # which is today's
         one = looks.choose(f"trial{number}", {"timestep": step, **more}, done)
         done.append(one)
         tell(one, front(done, looks))
