@@ -197,6 +197,7 @@ class Inserting(Task):
         hand = Manipulator(world, Randomness.of(seed).planner)
         reasons: list[str] = []
         forces: list[float] = []
+        there = False
         world.mark("start")
         try:
             with world.phase("pick"):
@@ -210,6 +211,7 @@ class Inserting(Task):
                 turn = Pose.at(0.0, 0.0, 0.0, yaw=quarter if self.section == "square" else seen.yaw)
                 hand.move_straight(aim * turn * seen.inverse() * hand.tool, speed=SLOW)
             with world.phase("insert"):
+                there = True
                 self.lower(hand, forces)
             rest(world, 2 * RESTLESS, "hold")
             hand.check_held()
@@ -219,10 +221,11 @@ class Inserting(Task):
         pose = world.pose("peg")
         *beside, depth = np.subtract((*HOLE, HIGH), (pose * Pose.at(0.0, 0.0, -LONG / 2)).position)
         inserted = not reasons and depth > 0.8 * self.depth
+        judged = there or self.references["inserted"]  # who does not get there keeps no peg out
         count(int(inserted), 1)
         peg = self.peg(Pose()).moved_to(pose)
         found: dict[str, float | None] = {
-            "inserted": float(inserted),
+            "inserted": float(inserted) if judged else None,
             "depth": 1000 * float(depth) if np.hypot(*beside) < WIDE / 2 else None,
             "overlap": 1000 * max(0.0, *(penetration(peg, body) for body in self.hole())),
             "force": max(forces, default=None),

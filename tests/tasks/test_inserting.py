@@ -95,6 +95,12 @@ def test_what_stands_in_a_wall_and_what_falls_are_told() -> None:
     assert fallen.reasons == ("peg is not in the hand",)
 
 
+@pytest.mark.parametrize(("phase", "told"), [("bring", None), ("insert", 0.0)])
+def test_who_brings_no_peg_to_the_hole_keeps_none_out(phase: str, told: float | None) -> None:
+    """Newton's defaults let 20 of 20 fall on the way, and were said to be right."""
+    assert inserted(Oversized(), Mishap(phase, 0.2, slip(z=-0.05))).metrics["inserted"] == told
+
+
 @pytest.mark.parametrize("kind", [Inserting, Oversized])
 def test_a_clearance_is_judged_from_three_times_what_is_added(kind: type[Inserting]) -> None:
     task = kind()
