@@ -16,8 +16,9 @@ from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import FloatArray, Pose
 from pytest_simbench.tasks import ArmPushing
-from pytest_simbench.tasks.arm_pushing import TICK, compared, described, each_tick
+from pytest_simbench.tasks.arm_pushing import CUBE, TICK, compared, described, each_tick
 from tests.conftest import measured, performed
+from tests.tasks.scripted import Mishap, move, perform
 
 URDF = """<robot name="arm">
   <joint name="m1n6s300_joint_1" type="continuous"><limit lower="-6" upper="6"/></joint>
@@ -57,6 +58,18 @@ def test_a_tool_is_tracked_to_a_micrometre_and_held_joints_stay() -> None:
         assert reached.position == pytest.approx(target.position, abs=1e-6)
         assert abs(np.dot(reached.quaternion, target.quaternion)) > 1 - 1e-8
     assert np.abs(np.diff(path, axis=0)).max() < 0.02
+
+
+def test_the_hand_is_told_where_the_real_one_went_and_how_fast() -> None:
+    task = ArmPushing(measured("arm_pushes"))
+    outcome, process = perform(task, Mishap("push", 2.0, move(CUBE, x=0.05)))
+    assert outcome.metrics["displacement"] == pytest.approx(0.05)
+    assert outcome.details["hand_error"] == pytest.approx(0.0, abs=1e-9)
+    told = process.asked[0].arguments
+    ways, speeds = np.diff(told["position"], axis=0), told["velocity"]
+    assert ways == pytest.approx(TICK * (speeds[1:] + speeds[:-1]) / 2, abs=1e-4)
+    assert np.abs(told["effort"]).max() > 1.0  # it carries itself
+    assert task.parameters()["task.calibrated_on"] == "CubeExp 1, 5, 9, 13, 17, 33"
 
 
 def test_the_cube_goes_where_the_real_one_went(case: Case) -> None:

@@ -15,6 +15,7 @@ from pytest_simbench.scene import Box, FloatArray, Pose
 from pytest_simbench.tasks import Impacting, Jitter
 from pytest_simbench.tasks.impacting import AFTER, GREY, off
 from tests.conftest import case_of, measured
+from tests.tasks.scripted import perform
 from tests.tasks.test_tossing import tossed
 
 
@@ -78,6 +79,14 @@ def test_the_scene_is_the_flight_before_the_impact() -> None:
     assert box.linear_velocity == pytest.approx((-0.5, 0.0, -1.0 + 9.81 * 0.01), abs=0.01)
     assert box.angular_velocity == pytest.approx((0.0, -4.0, 0.0))
     assert box.inertia() / box.mass == pytest.approx(MOMENT)
+
+
+def test_a_square_that_stops_dead_is_off_by_all_of_its_speed() -> None:
+    task = Impacting(MADE_UP)
+    outcome, _ = perform(task, seed=2)
+    lost = np.linalg.norm(task.real(2).left(AFTER) * SCALE)
+    share = lost / np.linalg.norm(task.real(2).after * SCALE)
+    assert outcome.metrics == pytest.approx({"velocity_error": lost, "relative_error": 100 * share})
 
 
 def strike(case: Case, task: Impacting) -> list[Record]:

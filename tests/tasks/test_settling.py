@@ -115,6 +115,7 @@ def test_what_it_cannot_do_is_one_sentence(scene: Scene, premises: list[Any], me
      (Nesting(), "settle"), (Carrying(), "still")],
 )  # fmt: skip
 def test_a_time_too_short_to_rest_in_is_refused(task: Task, of: str) -> None:
+    assert getattr(task.smoke(), of) == 1.0
     for seconds in (0.9, -3.0, np.nan):
         with pytest.raises(SceneError, match=rf"time \[s\] of {task.name} is .* from 1 to"):
             replace(task, **{of: seconds})  # type: ignore[arg-type]
