@@ -255,6 +255,7 @@ def test_what_is_seen() -> None:
     ):  # fmt: skip
         assert np.array_equal(found, right)
     assert seen.goal == Pose.at(1, 2, 3)
+    assert sight.read(state, picture=told).picture is told
     assert seen.pose("cube") == Pose.from_array(bodies[0])
     assert seen.tool == SERVO.tool_pose(joints[0])
     with pytest.raises(PolicyError, match="'ball'; the free bodies are: cube, other"):

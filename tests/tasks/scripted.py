@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -277,11 +278,14 @@ def perform(
     process: ScriptedProcess | None = None,
     says: bool = True,
 ) -> tuple[Outcome, ScriptedProcess]:
-    """A task's score in the world of the script, every mishap of which must have happened."""
+    """A task's score in the world of the script, every mishap of which must have happened; nothing
+    is drawn but by the seed."""
     process = process or ScriptedProcess()
     process.pending += script
     world = ScriptedWorld(process, task.scene(seed, jitter or Jitter()))
-    outcome = task.perform(world, seed, lambda *count: process.counts.append(count))
+    with patch.object(np.random, "SeedSequence", wraps=np.random.SeedSequence) as drawn:
+        outcome = task.perform(world, seed, lambda *count: process.counts.append(count))
+    assert all(call.args == (seed,) for call in drawn.call_args_list)
     assert not process.pending, f"never happened: {process.pending}"
     asked = dict(Counter(asked.phase for asked in process.asked))
     told = rounded([asked, process.counts, process.marks, outcome])

@@ -254,6 +254,7 @@ STUDY = replace(TASK.study(), feasible=True)
         # pushed a little, and creeps on to 6 cm: the throw's doing where that is most of the way
         *((LONG, creep(0.06 - push), {"pyramid_6": (0.0, push, 0.0)}, moved, 1 - moved)
           for push, moved in ((0.02, 0), (0.028, 0), (0.032, 1), (0.049, 1))),
+        (LONG, creep(0.04), {"pyramid_6": (0.0, 0.02, 0.0), "pyramid_4": (0.0, -0.1, 0.0)}, 1, 1),
         (LONG, creep(0.2), {"pyramid_6": (0.0, 0.06, 0.0)}, 1, 0),  # pushed away, and creeps on
         (LONG, creep(0.07), {"pyramid_6": (0.0, 0.01, 0.06)}, 0, 1),  # lifted, and creeps away
         (TASK, [Mishap("settle", 2.0, move("pyramid_6", x=-0.08))], AWAY, 0, 0),  # and back
