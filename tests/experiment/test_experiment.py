@@ -26,6 +26,7 @@ from pytest_simbench.scene import Box, Pose, Scene, SceneError
 from pytest_simbench.scene.policy import LoopError
 from pytest_simbench.tasks import Reaching, Settling
 from pytest_simbench.tasks.base import Task
+from pytest_simbench.tasks.recorded import code_of
 from tests.description.test_urdf_check import stl
 from tests.made_up import MadeUp
 from tests.motion.small_arm import small_arm
@@ -172,6 +173,28 @@ def test_the_live_line_is_told_of_each_repetition(case: Case) -> None:
         call.repetition(1, 10001, ""), call.end_repetition("ok", 1.0),
         call.repetition(3, 10003, ""), call.end_repetition("ok", 1.0), call.end_test(),
     ]  # fmt: skip
+
+
+ACTED: list[int] = []
+
+
+def counting() -> Falling:
+    class Counting(Falling):
+        def perform(self, *_: Any) -> Any:
+            ACTED.append(len(ACTED))
+
+    return Counting()
+
+
+def test_the_code_of_a_task_is_told_as_it_was_before_it_acted(case: Case) -> None:
+    def end(experiment: Experiment, number: int) -> tuple[dict[str, Any], None]:
+        experiment.task.perform(Mock(), 0, Mock())
+        return {"status": "ok", "metrics": {"landed": 1.0}}, None
+
+    repeater = Repeater(Experiment(case, counting()), MadeUp(1, end), Mock(), lambda record: None)
+    (record,) = repeater.up_to(1, {})
+    ACTED.clear()
+    assert record.task_code == code_of(counting()) != ""
 
 
 @pytest.mark.parametrize("kind", [LoopError, SceneError])

@@ -99,6 +99,7 @@ def test_a_failing_test_keeps_its_worker_and_tells_how_to_replay(
     (path,) = (tmp_path / "examples").iterdir()
     assert note.startswith("replay this episode: simbench replay ")
     assert note.endswith(path.name)
+    assert path.name.startswith("test_a_failing_test_keeps_its_worker")
     with handle.episode(SCENE) as world:
         assert world.process.pid == pid
     assert main(["replay", str(path)]) == 0
@@ -206,9 +207,10 @@ def test_this_machine_says_how_it_is_run(
     path: Path, case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own: dict[str, Any] = {"mode": "gui", "python": "p", "spec": "s"}
-    found = read_example(path, tmp_path / "logs", **own)
+    changes = {"cone": "elliptic"}
+    found = read_example(changed(path, "case", "changes", to=changes), tmp_path / "logs", **own)
     known = Case.of("mujoco", test=case.test, profile="tuned", folder=tmp_path / "logs", **own)
-    assert found == Example(known, SCENE, TAPE, {"mujoco": "3.0.0"})
+    assert found == Example(replace(known, changes=changes), SCENE, TAPE, {"mujoco": "3.0.0"})
     monkeypatch.setattr(example, "missing", lambda info: f"no {info.name} here")
     with pytest.raises(ExampleError, match="no mujoco here"):
         read_example(path, tmp_path)
@@ -255,7 +257,8 @@ def test_a_robot_of_unknown_files_needs_a_word(
     path = write_example(case, "robot", scene, TAPE)
     assert main(["replay", str(path)]) == 2
     assert (
-        "robot 'mine' is not known here (known: panda, so101, ur10, ur5, xarm7)"
+        "robot 'mine' is not known here (known: panda, so101, ur10, ur5, xarm7), and the files "
+        "that describe it are not read at a file's word; give --trust-robot if you know where the "
         in capsys.readouterr().err
     )
     assert read_example(path, tmp_path, python="p", trust_robot=True).scene == scene

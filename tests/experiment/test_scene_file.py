@@ -29,15 +29,23 @@ def test_a_file_is_read_once_until_it_changes(
     assert found.scene.file == str(path) == str(found.path)
     assert found.account
     assert read_scene_file(str(path)) is found
-    path.write_text(TEXT.replace("cube", "block"))
+    path.write_text(TEXT.replace("cube", "cone"))  # as long as before
     os.utime(path, (1, 1))
-    assert read_scene_file(path).scene.body("block")
+    assert read_scene_file(path).scene.body("cone")
 
 
-@pytest.mark.parametrize("name", ["a.usd", "a.sdf", "a.txt", "a.urdf"])
+@pytest.mark.parametrize("name", ["a.usd", "a.sdf", "a.txt", "a.urdf", "a"])
 def test_files_that_nobody_reads_are_told(tmp_path: Path, name: str) -> None:
     with pytest.raises(DescriptionError, match=name):
         read_scene_file(tmp_path / name)
+
+
+def test_an_engine_that_is_not_here_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pytest_simbench.experiment.scene_file.missing", lambda info: "no engine")
+    with pytest.raises(DescriptionError, match="is read by MuJoCo, which is not here: pip"):
+        read_scene_file(tmp_path / "a.xml")
 
 
 def test_what_the_engine_refuses_is_one_sentence(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from dataclasses import replace
 from typing import Any
@@ -140,14 +141,21 @@ def test_all_that_is_in_the_record(case: Case) -> None:
     assert_approved("record", "\n".join([*told, *files, json.dumps(found, indent=1)]))
 
 
-WRONG = [None, {"other": 1.0}, {"towers": 1.0, "standing": 2.0}, {"towers": 1.0, "standing": "x"}]
+def test_the_peak_of_memory_is_the_worker_s_own(case: Case) -> None:
+    repetition = ScriptedRepetition(Experiment(case, TOWERS), 1)
+    repetition.process.pid = os.getpid()
+    repetition.process.do_stats = lambda: {"peak_rss_mb": 1e6}  # type: ignore[method-assign]
+    assert repetition.run()[0].resources["rss_mb"]["peak"] == 1e6
+
+
+WRONG = [True, {"other": 1.0}, {"towers": 1.0, "standing": 2.0}, {"towers": 1.0, "standing": "x"}]
 
 
 @pytest.mark.parametrize("score", WRONG)
 def test_an_outcome_that_cannot_be_is_a_failure(
     case: Case, monkeypatch: pytest.MonkeyPatch, score: Any
 ) -> None:
-    monkeypatch.setattr(LeaningTowers, "perform", lambda *_: score and Outcome(score))
+    monkeypatch.setattr(LeaningTowers, "perform", lambda *_: score is True or Outcome(score))
     record = run(case, TOWERS)
     assert (record.status, record.metrics) == ("failed", {})
     assert_approved_line("outcomes", f"{score}: {record.error}")

@@ -12,6 +12,7 @@ import pytest
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.experiment.identity import file_stem_of
 from pytest_simbench.experiment.photographer import photograph
 from pytest_simbench.experiment.repetition import Repetition
 from pytest_simbench.recordings.film import SIZE, Album
@@ -168,6 +169,7 @@ def test_whose_film_is_kept(case: Case, mode: str, kept: list[str]) -> None:
         record, _ = Repetition(Experiment(filmed, task), 1).run()
         assert record.notes.filmed
         for path in (case.folder / "videos").glob("*"):
+            assert path.stem == file_stem_of(record)
             path.unlink()
             found.append(f"{task.name} 1".removeprefix("falling "))
     assert found == kept
@@ -190,6 +192,11 @@ def test_what_goes_wrong_is_told(case: Case) -> None:
     assert told.startswith("mujoco: pictures end early: EngineFailed: ModuleNotFoundError")
     assert "\n" not in told  # of the log: a missing Vulkan device is told here, too
     assert not list((case.folder / "pictures").glob("*.npz"))
+
+
+def test_a_mistake_of_the_task_is_told(case: Case) -> None:
+    told = photograph(Experiment(case, Unlucky()))
+    assert told.startswith("mujoco: pictures end early: RuntimeError: bad luck")
 
 
 def of(case: Case) -> dict[str, object]:
