@@ -12,6 +12,7 @@ from itertools import chain
 from pathlib import Path
 
 from pytest_simbench.cli.main import INTERRUPTED
+from pytest_simbench.cli.names import read_names
 from pytest_simbench.cli.runs import RUNS
 from pytest_simbench.cli.searching import BUDGET, begins_with, runs_in
 from pytest_simbench.cli.selection import Selection, check
@@ -60,7 +61,8 @@ def fit(
     """
     labels, files = begins_with(sim, profile)
     assert sim is not None  # or it was refused
-    chosen = Selection((sim,), ("headless",), labels, named=(sim,), files=files)
+    (sim,), builds = read_names([sim], Path.cwd())
+    chosen = Selection((sim,), ("headless",), labels, pythons=builds, named=(sim,), files=files)
     check(chosen, makes=False)
     variant = Variant(sim, "headless", labels[0])
     world = read_scene_file(scene).scene

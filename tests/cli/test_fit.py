@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -114,6 +115,7 @@ def test_the_mass_and_both_gains_are_not_told_apart(
         ({"drive.xml": "ball.xml", "log.npz": "mm.npz"}, "'ball' is outside the room"),
         ({"damping:hinge": "damping:hinge=1..1e15"}, "'damping:hinge=1..1e15': the damping of"),
         ({"--noise": "--profile", "0.001": "file"}, "loads the scene as it is written"),
+        ({"mujoco": "mujoco@nowhere"}, "mujoco@nowhere: there is no such program on the PATH"),
     ],
 )
 def test_bad_input(
@@ -131,6 +133,9 @@ def test_no_unknown_and_no_time(folder: Path, capsys: pytest.CaptureFixture[str]
     assert "name what is unknown: --unknown NAME; choose from" in capsys.readouterr().err
     assert main([*BOTH, "--budget", "0.5s"]) == 130
     assert "the budget is used up after" in capsys.readouterr().out
+    own = [f"mujoco@mine={sys.executable}" if word == "mujoco" else word for word in BOTH]
+    assert main([*own, "--budget", "0.5s", "--output", "mine"]) == 130
+    assert '"simulator": "mujoco@mine"' in (folder / "mine/records.jsonl").read_text()
     with np.load(folder / "log.npz") as log:  # in mm
         np.savez(folder / "far.npz", **{**log, "hinge": 1000 * log["hinge"]})
     far = ["fit", "drive.xml", "far.npz", *BOTH[3:7], "--budget", "0.1s", "--output"]
