@@ -11,9 +11,11 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
+from pytest_simbench.cli import tune
 from pytest_simbench.cli.main import main
 from pytest_simbench.cli.runs import RUNS
 from pytest_simbench.cli.tune import _judge
@@ -25,6 +27,7 @@ from pytest_simbench.cli.tune_told import (
     together,
     verdict_of,
 )
+from pytest_simbench.cli.values import BadInput
 from pytest_simbench.measure.intervals import Interval
 from pytest_simbench.records.tuned_on import Seen
 from pytest_simbench.simulator.profile_file import read_profile
@@ -164,6 +167,23 @@ def test_a_test_that_was_edited_is_searched_for_anew(
         Path("test_edited.py").write_text(text)
         assert main([*words, "--trials", "1", "--seeds", "1", "--budget", "5s"]) == 0
     assert len([*Path(RUNS).iterdir()]) == 2
+
+
+def test_it_begins_with_the_profile_s_file_and_what_the_test_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    search = Mock(side_effect=BadInput("seen"))
+    monkeypatch.setattr(tune, "Search", search)
+    Path("test_begun.py").write_text(TEST)
+    Path("pytest.ini").write_text("[pytest]\nsim_set = mujoco.timestep=0.003\n")
+    Path("own.toml").write_text('simulator = "mujoco"\n[settings]\niterations = 42\n')
+    words = ("tune", "test_begun.py::test_falls", "--sim", "mujoco", "--profile", "own.toml")
+    assert main([*words, "--output", "out"]) == 2
+    base = search.call_args.args[1]
+    assert (base.timestep, base.iterations) == (0.003, 42)
 
 
 def test_killed_and_gone_on_with(tmp_path: Path) -> None:
