@@ -221,14 +221,13 @@ class Inserting(Task):
         pose = world.pose("peg")
         *beside, depth = np.subtract((*HOLE, HIGH), (pose * Pose.at(0.0, 0.0, -LONG / 2)).position)
         inserted = not reasons and depth > 0.8 * self.depth
-        judged = there or self.references["inserted"]  # who does not get there keeps no peg out
         count(int(inserted), 1)
         names = [metric.name for metric in self.metrics]
         if not (there or self.references["inserted"]):  # who does not press keeps nothing out
             return Outcome(dict.fromkeys(names), reasons=tuple(reasons))
         peg = self.peg(Pose()).moved_to(pose)
         found: dict[str, float | None] = {
-            "inserted": float(inserted) if judged else None,
+            "inserted": float(inserted),
             "depth": 1000 * float(depth) if np.hypot(*beside) < WIDE / 2 else None,
             "overlap": 1000 * max(0.0, *(penetration(peg, body) for body in self.hole())),
             "force": max(forces, default=None),

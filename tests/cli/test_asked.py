@@ -56,6 +56,10 @@ TESTS = """
     def test_needs(repeat):
         pass
 
+    def test_lower(repeat):
+        from pytest_simbench.tasks import Throwing
+        assert repeat(Throwing()).values("landing_error") == [0.0]
+
     def test_scene(repeat, scene_file):
         repeat(scene_file("gone.xml"))
 """
@@ -106,6 +110,10 @@ def test_one_of_several_parameters(ids: str) -> None:
     found = asked(f"test_mine.py::test_ids[{ids}]", OPTIONS)
     assert found.experiment.task.parameters() == {"task.duration": 0.5}
     assert (found.claims, found.failed) == ((), "AssertionError: not known")
+
+
+def test_what_is_better_the_lower_it_is_is_nought() -> None:
+    assert asked("test_mine.py::test_lower", OPTIONS).failed == ""
 
 
 ASKING_NOTHING = """test_mine.py::test_nothing test_mine.py::test_two test_mine.py::test_law

@@ -29,8 +29,8 @@ class Recorded(Search):
 JUNIT = """<testsuite>
 <testcase classname="test_a" name="test_x[sim==1.9]"><properties>
 <property name="falling 1: repetitions" value="3"/></properties></testcase>
-<testcase classname="test_a" name="test_y"/>
-<testcase classname="b" name="c"><skipped message="not here&#10;at all"/></testcase></testsuite>"""
+<testcase classname="test_a" name="test_y"/><testcase classname="b" name="c"><properties/>
+<skipped message="not here&#10;at all"/></testcase></testsuite>"""
 
 
 @pytest.mark.parametrize(("folder", "keep"), [("new", "--sim-output"), ("old", "--sim-resume")])

@@ -11,8 +11,9 @@ from types import SimpleNamespace
 import pytest
 
 import pytest_simbench
-from pytest_simbench.cli import environments, simulators
+from pytest_simbench.cli import environments, robots, simulators
 from pytest_simbench.cli.main import COMMANDS, GROUPS
+from pytest_simbench.cli.names import progress
 from pytest_simbench.simulator.registry import adapter, registered
 from tests.approval import assert_approved, assert_approved_line
 from tests.cli.command import said
@@ -222,6 +223,25 @@ def test_robots_and_their_files(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     oiled = URDF.replace("</joint>", '<dynamics damping="5" friction="0.0"/></joint>', 2)
     out = said(capsys, "robots", str(small_arm(tmp_path, urdf=oiled)))[1]
     assert "    not used of the URDF: damping and friction of turn, lift (<dynamics>)\n" in out
+
+
+def test_a_broken_robot_hides_no_other(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(robots, "known", lambda: ["gone", "ur5"])
+    status, out, _ = said(capsys, "robots")
+    assert status == 1
+    assert out.startswith("gone: BROKEN: unknown robot 'gone'; choose from panda, ")
+    assert "\nur5: 6 arm joints" in out
+
+
+def test_where_no_terminal_is_an_installation_tells_its_end(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    tell = progress()
+    for text in ("\r1 MB", "\r2 MB\n", "done\n"):
+        tell(text)
+    assert capsys.readouterr().out == "2 MB\ndone\n"
 
 
 def test_environments_come_and_go(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -98,6 +98,14 @@ def test_claims_of_parts_are_not_those_of_the_whole(
     assert "b: what it found on repeatability is of that run alone\n" in told
 
 
+def test_a_part_that_failed_fails_the_whole(here: Path) -> None:
+    for name, seed in (("a", 1), ("b", 2)):
+        saved(here / name, seed, "")
+        write_outcome(here / name, RunOutcome(name == "a"))
+    assert merge("a", "b") == 0
+    assert RunOutcome.read(here / "whole")[0].passed is False
+
+
 @pytest.mark.parametrize(
     "log",
     ["d/../../victim.log", "{victim}", "../victim.log", "logs/link.log", "out/victim.log", "logs",

@@ -11,6 +11,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -186,6 +187,23 @@ def test_a_test_that_was_edited_is_searched_for_anew(
         Path("test_edited.py").write_text(text)
         assert main([*words, "--trials", "1", "--seeds", "1", "--budget", "5s"]) == 0
     assert len([*Path(RUNS).iterdir()]) == 2
+
+
+def test_it_begins_with_the_profile_s_file_and_what_the_test_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    search = Mock(side_effect=BadInput("seen"))
+    monkeypatch.setattr(cli_tune, "Search", search)
+    Path("test_begun.py").write_text(TEST)
+    Path("pytest.ini").write_text("[pytest]\nsim_set = mujoco.timestep=0.003\n")
+    Path("own.toml").write_text('simulator = "mujoco"\n[settings]\niterations = 42\n')
+    words = ("tune", "test_begun.py::test_falls", "--sim", "mujoco", "--profile", "own.toml")
+    assert main([*words, "--output", "out"]) == 2
+    base = search.call_args.args[1]
+    assert (base.timestep, base.iterations) == (0.003, 42)
 
 
 def test_killed_and_gone_on_with(tmp_path: Path) -> None:

@@ -155,7 +155,7 @@ def test_the_first_watch_notes_the_newest_and_the_next_begins_there(
         told, page = capsys.readouterr().out.splitlines()
         assert told == f"mujoco: nothing came after 3.3.7{begins}"
         assert page == "page: .simbench/watch/index.html"
-    monkeypatch.setattr(watch, "releases", lambda distribution: ["3.2.7", "3.3.6", "4.0.0"])
+    monkeypatch.setattr(watch, "releases", lambda of: ["3.2.4", "3.2.7", "3.3.6", "4.0.0"])
     assert main(["watch", "mujoco"]) == 1  # 3.3.7 was taken back
     assert work == [["3.3.6", "4.0.0"]]
     page = Path(".simbench/watch/index.html").read_text()

@@ -10,13 +10,15 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from pytest_simbench.client import connection
-from pytest_simbench.client.closed_loop import shipped
+from pytest_simbench.client.closed_loop import Watched, shipped
 from pytest_simbench.client.errors import PolicyFailed, Where, WorkerExited, WorkerHung
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
@@ -118,6 +120,8 @@ def test_it_ends_when_it_shall(world: Worlds) -> None:
     assert one.time == pytest.approx(0.2)
     one.control(still, until=lambda seen: seen.time >= 0.3 - 1e-9, observation_delay=0.04)
     assert one.time == pytest.approx(0.3)  # what is seen late does not end late
+    one.control(SimpleNamespace(act=still), until=0.02)  # whatever has `act`, at the usual rate
+    assert one.time == pytest.approx(0.32)
 
 
 def test_from_a_kept_state_it_acts_as_it_did_there(world: Worlds) -> None:
@@ -273,6 +277,23 @@ def test_one_inside_needs_no_reset_and_one_that_raises_is_told_in_its_own_words(
     made["source"] += "    def reset(self, seed):\n        raise ValueError(seed)\n"
     with pytest.raises(PolicyError, match=r"policy Plain raised ValueError: 1 \(plain.py:5\)"):
         loop.inside(SCENE, rows, 0.1, made | {"goal": None})
+
+
+def test_one_that_stalls_is_told_and_holds_up_nobody() -> None:
+    process, answer = Mock(where=Where("mujoco", "headless")), threading.Event()
+    process.launch.stall_timeout = 0.1
+    watched, threads = Watched(process, "slow"), list[threading.Thread]()
+
+    def act() -> None:
+        threads.append(threading.current_thread())
+        answer.wait(20.0)
+
+    with pytest.raises(PolicyFailed, match="the policy slow gave no answer for 0.1 s"):
+        watched.run(lambda: watched.ask(act))
+    process.kill.assert_called_once_with()
+    assert threads[0].daemon  # or pytest would wait for it at the end
+    answer.set()
+    threads[0].join()
 
 
 def test_what_of_a_policy_goes_to_the_worker() -> None:

@@ -124,10 +124,10 @@ def test_two_that_make_the_same_wait_for_each_other(info: SimulatorInfo) -> None
 
 def test_what_is_there_and_removing_it(info: SimulatorInfo) -> None:
     assert list(existing()) == []
-    environment = half_made(info)
+    environment = half_made(replace(info, distribution="Six-th"))
     (environment.folder / "large").write_bytes(bytes(3_000_000))
     assert environments.size_mb(environment.folder) == pytest.approx(3.0, abs=0.1)
-    for name, version in (("sixty", "1.0"), ("Six", "1.2"), ("six", "2.0")):
+    for name, version in (("sixty", "1.0"), ("Six_Th", "1.2"), ("six-th", "2.0")):
         told = environment.folder / f"lib/python3.9/site-packages/{name}-{version}.dist-info"
         assert environment.version() == ("1.2" if version == "2.0" else None)
         told.mkdir(parents=True)
@@ -165,6 +165,23 @@ def test_nothing_is_made_while_something_is_wrong_with_another(info: SimulatorIn
     wrong = replace(info, name="wrong", requirements=())
     with pytest.raises(SimulatorError, match="wrong needs no environment of its own"):
         create_all([Environment.of(info), Environment.of(wrong)], print)
+    assert list(existing()) == []
+
+
+def test_an_engine_that_is_importable_here_needs_no_environment(info: SimulatorInfo) -> None:
+    assert missing(replace(info, modules=("json",))) is None
+    assert missing(replace(info, requirements=())) == (
+        f"sixth is not installed (no module {ABSENT}); install it: simbench install sixth"
+    )
+
+
+def test_a_release_that_is_none_is_told_before_anything_is_made(
+    info: SimulatorInfo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(package_index, "releases", {"mujoco": ["3.3.7"]}.__getitem__)
+    Environment.of(adapter("mujoco==3.3.7").info).check()
+    with pytest.raises(SimulatorError, match="^mujoco==3.3.9: the package index has no mujoco 3.3"):
+        Environment.of(adapter("mujoco==3.3.9").info).create()
     assert list(existing()) == []
 
 
@@ -253,6 +270,11 @@ def test_caches_are_kept_beside_it_unless_the_user_says_where(
     assert kept == {"SIXTH_CACHE": str(environment.folder / "cache" / "kernels")}
     monkeypatch.setenv("SIXTH_CACHE", "elsewhere")
     assert environment.variables() == {}
+
+
+def test_what_a_program_says_that_fails_is_told_with_what_it_was_given() -> None:
+    with pytest.raises(SimulatorError, match="1 failed: no answer of mine"):
+        environments._run(["sh", "-c", "echo no answer; echo of $X; exit 1"], {"X": "mine"}, print)
 
 
 ABSENT = "no_such_module_here"

@@ -18,10 +18,11 @@ from pytest_simbench.client.answers import Frame
 from pytest_simbench.client.errors import BadState, Diverged, Where
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.process import WorkerProcess
-from pytest_simbench.client.tape import ARRAYS, Latency, Operation
+from pytest_simbench.client.tape import ARRAYS, Latency, Operation, TapedWorld
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
+from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Pose, Scene, SceneError, Sphere, Trajectory
 from pytest_simbench.tasks.base import cube
 from pytest_simbench.worker.wire import pack
@@ -244,6 +245,15 @@ def test_a_delay_is_no_whole_number_of_ticks_and_an_effort_ends_at_once() -> Non
     assert [one.ravel()[[0, 1, 2, -1]].tolist() for one in ends] == [[7.0] * 4, [7.0, 0, 0, 0]]
     late = latency.late(ramp(0.0, 1.0, 5)).arguments["position"]
     assert late.ravel() == pytest.approx([0.0, 0.1875, 0.4375, 0.6875, 0.9375])
+
+
+def test_a_world_with_a_late_controller_moves_late() -> None:
+    process: Any = ScriptedProcess()
+    world = TapedWorld(process, replace(LOW, robot=panda()), delay=TICK)
+    rows = panda().column("initial_position") + np.linspace(0.0, 0.1, 11)[:, None]
+    world.follow(Trajectory(TICK, rows, 0 * rows, 0 * rows))
+    assert process.asked[-1].arguments["position"] == pytest.approx(rows[[0, *range(10)]])
+    assert world.tape[-1].arguments["position"] is rows  # what was asked for
 
 
 def test_before_the_first_motion_nothing_is_late() -> None:
