@@ -125,10 +125,13 @@ def watch(
     Raises:
         BadInput, SimulatorError: what cannot be; one sentence.
     """
-    begins = {VersionedName.of(text.removesuffix(MINOR)).base: text for text in since or ()}
-    for text in begins.values():
+    begins = dict[str, str]()
+    for text in since or ():
         if RELEASE not in text:
             raise BadInput(f"--since {text}: write it as NAME==RELEASE or NAME==RELEASE{MINOR}")
+        name = VersionedName.of(text.removesuffix(MINOR)).base
+        if begins.setdefault(name, text) != text:
+            raise BadInput(f"--since {text}: {begins[name]} says already where {name} begins")
     names = _names([*dict.fromkeys([*engines, *begins])])
     with refusing((LimitError, UnknownMetric), "--limit"):
         limits = parse_limits(limit or LIMITS, [m for task in TASKS for m in task.metrics])

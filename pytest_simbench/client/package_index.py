@@ -117,7 +117,7 @@ def pip_configuration() -> dict[str, str]:
 
 def _indexes() -> list[str]:
     configured = pip_configuration()
-    if "no-index" in configured:
+    if configured.get("no-index", "0").lower() in ("1", "true", "yes", "y", "t", "on"):
         return []
     return [configured.get("index-url", PYPI), *configured.get("extra-index-url", "").split()]
 

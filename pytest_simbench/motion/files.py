@@ -59,7 +59,7 @@ def read_robot(path: str | Path) -> Robot:
     """
     path = Path(path)
     try:
-        data = tomllib.loads(read_file(path, LARGEST_FILE, "the robot file").decode())
+        data = tomllib.loads(read_file(path, LARGEST_FILE, "the robot file").decode("utf-8-sig"))
     except FileError as error:
         raise RobotError(str(error)) from None
     except (ValueError, RecursionError) as error:

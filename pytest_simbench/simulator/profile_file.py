@@ -74,7 +74,7 @@ def read_profile(path: str | Path) -> ProfileFile:
         SettingsError: the file cannot be used; one sentence.
     """
     try:
-        data = tomllib.loads(read_file(path, LARGEST_FILE, "the profile").decode())
+        data = tomllib.loads(read_file(path, LARGEST_FILE, "the profile").decode("utf-8-sig"))
     except FileError as error:
         raise SettingsError(str(error)) from None
     except (ValueError, RecursionError) as error:

@@ -19,7 +19,15 @@ from pytest_simbench.laws import Law
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Record
 from pytest_simbench.scene.policy import LoopError
-from pytest_simbench.tuning.target import CONVERGED, FINER, FIRST_CHOSEN, Look, Target, TuningError
+from pytest_simbench.tuning.target import (
+    CONVERGED,
+    FAILED,
+    FINER,
+    FIRST_CHOSEN,
+    Look,
+    Target,
+    TuningError,
+)
 
 CHEAPER = 0.9
 """What another candidate may have cost of this one's, so that this one is hopeless: less of a
@@ -208,7 +216,10 @@ class Trials:
         return [Candidate(CONVERGED, {"timestep": step}, half)]
 
     def error(self, found: Candidate) -> float:
-        """Of what was looked at; of the rest it is taken to be alike, or of laws right."""
+        """Of what was looked at; of the rest it is taken to be alike, or of laws right. The worst
+        where nothing tells it."""
+        if not found.errors:
+            return FAILED
         chosen = self.target.chosen if self.target.laws and not found.half else ()
         return self.target.together(found.errors, chosen)
 

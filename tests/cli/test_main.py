@@ -102,6 +102,10 @@ def test_help_loads_nothing_large() -> None:
         ("watch coppeliasim", "*coppeliasim: no package index has its releases; choose from *"),
         ("watch mujoco==3.3.7", "*: name the simulator alone; --since mujoco==3.3.7 begins *"),
         ("watch --since mujoco", "*: --since mujoco: write it as NAME==RELEASE or *"),
+        (
+            "watch --since mujoco==3.2.7 --since mujoco==4.0.0",
+            "*: --since mujoco==4.0.0: mujoco==3.2.7 says already where mujoco begins",
+        ),
         ("watch mujoco --scene no.xml", "*: --scene no.xml: there is no such file; give an *"),
         ("watch mujoco --limit no:5%", "*: --limit: no metric is named 'no'; valid names: *"),
         ("watch mujoco --output seen", "*: seen/watch.json: *; remove it to begin anew"),

@@ -230,6 +230,10 @@ def test_what_pip_is_configured_with(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     monkeypatch.delenv("PIP_EXTRA_INDEX_URL")
     config.write_text("[global]\nextra-index-url =\n    https://b\n    https://c\n")
     assert package_index._indexes()[1:] == ["https://b", "https://c"]
+    config.write_text("[global]\nno-index = false\n")
+    assert package_index._indexes() == [package_index.PYPI]
+    config.write_text("[global]\nno-index = True\n")
+    assert package_index._indexes() == []
 
 
 def test_pips_configuration_is_uvs_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -50,7 +50,7 @@ def test_a_file_may_change_nothing(tmp_path: Path) -> None:
 
 def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
     first = read_profile(written(tmp_path, TEXT)).label
-    assert first == read_profile(written(tmp_path, f"# the same\n{TEXT}")).label
+    assert first == read_profile(written(tmp_path, f"\ufeff# the same\n{TEXT}")).label
     assert first != read_profile(written(tmp_path, TEXT.replace("0.004", "0.005"))).label
     assert first.startswith("quick-")
 

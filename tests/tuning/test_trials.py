@@ -13,7 +13,7 @@ from pytest_simbench.client.errors import SceneRefused, Where
 from pytest_simbench.laws import LAWS
 from pytest_simbench.records.record import Failure
 from pytest_simbench.scene.policy import LoopError
-from pytest_simbench.tuning.target import FIRST_CHOSEN, FIRST_JUDGED, Look, TuningError
+from pytest_simbench.tuning.target import FAILED, FIRST_CHOSEN, FIRST_JUDGED, Look, TuningError
 from pytest_simbench.tuning.trials import Candidate, least_costs
 
 from .made_up import target, trials
@@ -27,6 +27,11 @@ def test_cost_and_error_are_those_of_the_records(tmp_path: Path) -> None:
     assert executor.asked == [("today", k) for k in (1, 2, 3, 4)]
     seeds = [(r.seed, r.settings["timestep"]) for r in looks.runs.folder.own]
     assert seeds[0] == (300_001, 0.002)
+
+
+def test_of_what_nothing_is_known_the_worst_is_told(tmp_path: Path) -> None:
+    looks, _ = trials(tmp_path, lambda s, k: 1.0)
+    assert looks.error(Candidate("trial1", {})) == FAILED
 
 
 def test_of_several_looks_at_a_law_the_least_cost_counts() -> None:
