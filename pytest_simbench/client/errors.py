@@ -134,8 +134,9 @@ REMOTE_ERRORS: dict[str, type[WorkerError]] = {
 }
 """Worker-side error names and what they become here; all others are `EngineFailed`."""
 
-HOLDING = ("compile", "load")
-"""Operations whose `NotSupportedError` is `SceneRefused`."""
+REFUSALS = {"compile": SceneRefused, "load": SceneRefused, "close_loop": Unavailable}
+"""What a `NotSupportedError` of these operations becomes. A policy may ask for what an engine does
+not have, a picture for instance."""
 
 
 def exit_text(code: int | None) -> str:

@@ -21,14 +21,13 @@ from pytest_simbench.client import bootstrap, reaper
 from pytest_simbench.client.answers import Constructed, Frame, checked
 from pytest_simbench.client.connection import Connection, RemoteError, elsewhere
 from pytest_simbench.client.errors import (
-    HOLDING,
+    REFUSALS,
     REMOTE_ERRORS,
     EngineFailed,
     Interrupted,
     OutOfMemory,
     ProtocolError,
     RepetitionTimeout,
-    SceneRefused,
     Where,
     WorkerError,
     WorkerExited,
@@ -303,8 +302,8 @@ class WorkerProcess:
 
     def _remote_error(self, error: dict[str, str], operation: str) -> WorkerError:
         kind = REMOTE_ERRORS.get(error["type"], EngineFailed)
-        if error["type"] == "NotSupportedError" and operation in HOLDING:
-            kind = SceneRefused
+        if error["type"] == "NotSupportedError":
+            kind = REFUSALS.get(operation, kind)
         found = kind(error["message"], self.where, self.launch.log_tail())
         if isinstance(found, EngineFailed):
             found.remote = error["type"]

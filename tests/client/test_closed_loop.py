@@ -19,7 +19,7 @@ import pytest
 
 from pytest_simbench.client import connection
 from pytest_simbench.client.closed_loop import Watched, shipped
-from pytest_simbench.client.errors import PolicyFailed, Where, WorkerExited, WorkerHung
+from pytest_simbench.client.errors import PolicyFailed, Unavailable, Where, WorkerExited, WorkerHung
 from pytest_simbench.client.process import WorkerProcess
 from pytest_simbench.client.world import World
 from pytest_simbench.experiment.case import Case
@@ -33,6 +33,7 @@ from pytest_simbench.tasks.base import cube
 from pytest_simbench.worker import loop
 from tests.client.failing import failure
 from tests.client.waving import Waving, stalling, still, writing
+from tests.conftest import case_of
 
 SCENE = Scene("arm", (cube("a", Pose.at(0.5, 0.3, 0.025), (1.0,) * 4),), panda())
 Worlds = Callable[..., World]
@@ -144,6 +145,12 @@ def test_forces_and_pictures_are_shown_where_they_are_asked_for(world: Worlds) -
     assert shown[-1].picture.std() > 10
     one.control(shown.append, until=0.04)
     assert (shown[-1].picture, shown[-1].forces) == (None, {})
+
+
+def test_that_an_engine_has_no_pictures_is_no_crash(case: Case, world: Worlds) -> None:
+    ode = case_of(case, "ode")
+    with pytest.raises(Unavailable, match="ode has no offscreen picture"):
+        world(adapter=ode.adapter, python=ode.python).control(still, until=0.1, picture=(64, 48))
 
 
 def test_a_motor_falls_and_takes_efforts(world: Worlds) -> None:
