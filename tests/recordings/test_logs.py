@@ -155,6 +155,13 @@ def test_a_recording_of_ours_is_read_back(
         read_log(tmp_path / "run" / "run.mcap", world)
 
 
+def test_a_recording_has_a_number_for_each_name(tmp_path: Path) -> None:
+    kept = trace()
+    write_bag(replace(kept, joint_names=[*kept.joint_names, "wrist"]), tmp_path / "run")
+    with pytest.raises(DescriptionError, match="is no recording: zip.. argument 2 is shorter"):
+        read_log(tmp_path / "run" / "run.mcap", scene())
+
+
 @pytest.mark.parametrize(
     ("arrays", "why"),
     [
