@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from pytest_simbench.simulator import (
     lazy_import,
 )
 from pytest_simbench.simulator.base import EYE, LOOK_AT, view_axes
+from pytest_simbench.simulator.info import BEYOND, check_supported
 from pytest_simbench.testing.faults import mechanisms, true_scene
 from tests.approval import assert_approved_message
 from tests.worker.hosted import Toy
@@ -97,6 +99,17 @@ def test_what_adapters_share(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_facts_of_another_type_are_refused(fact: dict[str, Any], told: str) -> None:
     with pytest.raises(SimulatorError, match=told):
         replace(Toy.info, name="toy", **fact)
+
+
+@pytest.mark.parametrize("word", BEYOND)
+def test_a_scene_beyond_an_engine_is_refused(word: str) -> None:
+    able = replace(Toy.info, capabilities=frozenset(Capability))
+    less = replace(able, capabilities=able.capabilities - {BEYOND[word][0]})
+    scene: Any = SimpleNamespace(name="s", words=frozenset({word}))
+    check_supported(able, scene)
+    check_supported(less, Scene("s"))
+    with pytest.raises(NotSupportedError, match=f"^{able.name} .* scene 's' "):
+        check_supported(less, scene)
 
 
 def test_a_deviation_counts_in_scenes_that_there_are() -> None:

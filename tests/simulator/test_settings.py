@@ -18,6 +18,7 @@ from pytest_simbench.simulator.settings import (
     changed,
     changes,
     flaw,
+    in_words,
     meanings,
     searched,
 )
@@ -86,6 +87,16 @@ def test_every_profile_of_every_engine_has_a_time_step_that_is_fine_enough() -> 
     for name in registered():
         for settings in adapter(name).profiles.values():
             assert 0 < changed(settings, settings.to_wire(), name).timestep <= 1 / 60
+
+
+def test_settings_are_taken_as_they_are_told() -> None:
+    """`simbench list --settings` says None of some, and 0.016667 s: neither was taken."""
+    for name in registered():
+        for settings in adapter(name).profiles.values():
+            told = {key: in_words(value) for key, value in settings.to_wire().items()}
+            found = changed(settings, told, name).to_wire()
+            assert {key: in_words(value) for key, value in found.items()} == told
+    assert in_words((0.123456, True, ("a", None))) == "0.12346/True/a/None"
 
 
 def test_settings_travel_and_come_back() -> None:
