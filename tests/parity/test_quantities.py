@@ -13,6 +13,7 @@ import pytest
 from pytest_simbench.description.shapes import DIRECTIONS
 from pytest_simbench.parity.quantities import expected_quantities, touches
 from pytest_simbench.scene import Box, Capsule, FloatArray, Joint, Pose, Robot, Scene
+from pytest_simbench.scene.robot import FREE as LOOSE
 from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.simulator.settings import Settings
 from tests.description.test_urdf_check import SOUND, described
@@ -184,6 +185,33 @@ def test_settings_change_what_they_name_and_add_nothing(arm: Robot) -> None:
     scene = Scene("s", (FREE, SHELF, PILL), arm, gravity=(0.1, 0.2, -9.0), ground_friction=0.8)
     wanted = {**expected(), "body/free/damping": [0.1, 0.2], "joint/slide/friction": 0.3}
     assert_quantities(expected_quantities(scene, Damped(0.004)), wanted)
+
+
+class Braked(Settings):
+    def quantities(self) -> Mapping[str, Any]:
+        return {f"joint/*/{name}": 7 for name in ("stiffness", "damping", "friction")}
+
+
+def test_a_motor_and_a_joints_own_friction_are_not_the_settings_and_springs_add_up(
+    arm: Robot,
+) -> None:
+    shoulder, slide, end = arm.joints
+    joints = (
+        replace(shoulder, stiffness=0.0, damping=0.0),
+        replace(slide, friction=0.5),
+        replace(end, spring=2.0, rest=0.25, passive_damping=3.0),
+    )
+    found = expected_quantities(Scene("s", (), replace(arm, joints=joints)), Braked(0.004))
+    told = [
+        [
+            float(found[f"joint/{joint.name}/{name}"])
+            for name in ("stiffness", "damping", "friction")
+        ]
+        for joint in joints
+    ]
+    assert told == [[LOOSE, 0, 7], [7, 7, 0.5], [9, 10, 7]]
+    assert [name for name in found if "rest" in name and "joint" in name] == ["joint/end/rest"]
+    assert found["joint/end/rest"] == 0.25
 
 
 def test_a_bodys_own_damping_replaces_that_of_the_settings() -> None:

@@ -27,6 +27,9 @@ from tests.repeatability.scripted import NAMES, operation
 from tests.repeatability.test_scripted import ALL, moved
 
 EVERYTHING = frozenset(Capability)
+PATIENCE = 20.0
+"""For what takes milliseconds, on a machine that is busy [s]."""
+
 MOMENTS = (Moment("in flight", "fly"),)
 WAYS = (
     "after a reset",
@@ -219,7 +222,7 @@ class Known:
         if isinstance(handle, Written) and isinstance(handle.end, Exception):
             raise handle.end
         if isinstance(handle, Written) and handle.end:
-            assert handle.closed.wait()
+            assert handle.closed.wait(PATIENCE)
         return PARTED if self.handle.done[-1:] == [0.5] else FIRST
 
 
