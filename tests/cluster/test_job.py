@@ -34,6 +34,7 @@ from pytest_simbench.motion.registry import find
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure
 from pytest_simbench.scene import Scene
+from pytest_simbench.scene.policy import Function
 from pytest_simbench.tasks import Holding, Reaching, Settling, Stacking
 from tests.cluster.test_pool import A, B, Told, lab
 from tests.tiny import Falling
@@ -75,6 +76,29 @@ def test_so_does_the_policy_of_a_file(case: Case, tmp_path: Path, name: str) -> 
     )
     (policy,) = read_policies(path, name)
     assert of_node(Experiment(case, Reaching(policy)), "task.policy.act(3)") == "3"
+
+
+class Still:
+    name = "still"
+
+    def act(self, seen: Any) -> Any:
+        return seen
+
+
+def unmoved(seen: Any) -> Any:
+    return seen
+
+
+@pytest.mark.parametrize("task", [Reaching(Still()), Reaching(Function(unmoved)), Falling(0.2)])
+def test_what_is_the_tests_own_travels_as_code(
+    case: Case, monkeypatch: pytest.MonkeyPatch, task: Any
+) -> None:
+    """And nothing else; afterwards cloudpickle sends as before."""
+    cloudpickle, sent, left = pytest.importorskip("cloudpickle"), list[Any](), list[Any]()
+    monkeypatch.setattr(cloudpickle, "register_pickle_by_value", sent.append)
+    monkeypatch.setattr(cloudpickle, "unregister_pickle_by_value", left.append)
+    Job.of(Experiment(case, task)).pack()
+    assert sent == left == [sys.modules["tests.tiny" if isinstance(task, Falling) else __name__]]
 
 
 def test_a_class_that_travelled_can_be_derived_from(case: Case) -> None:
