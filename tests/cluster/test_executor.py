@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import CancelledError, Future
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,7 +17,7 @@ from pytest_simbench.cluster.job import Packed, TaskFailed
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Hooks
-from tests.cluster.test_pool import A, B, Told, node
+from tests.cluster.test_pool import A, B, Told, lab, node
 from tests.tiny import Falling
 
 KilledWorker = pytest.importorskip("distributed.scheduler").KilledWorker
@@ -149,6 +150,13 @@ def test_a_repetition_ends_with_its_record_or_with_what_went_wrong(
     record, ended = repetition.run()
     assert (ended, record.seconds["total"], record.status) == (error, 2.5, "interrupted")
     assert (record.repetition, record.error.type, held) == (2, "OSError", ["held", "held"])
+
+
+def test_a_window_needs_a_node_with_a_display(one: Any) -> None:
+    repetition, _ = one(Told([]))
+    repetition.case = replace(repetition.case, mode="gui")
+    nodes = A, lab("d", "mujoco==4.0", "display")
+    assert [repetition._able(node) for node in nodes] == [False, True]
 
 
 def test_there_are_more_threads_than_slots() -> None:

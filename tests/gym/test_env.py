@@ -242,7 +242,7 @@ def test_what_is_asked_too_early_is_refused() -> None:
         env.render()
     with pytest.raises(ResetNeeded, match=r"^no picture was taken yet: call reset\(\)$"):
         make("pushing", "mujoco", python="p", render_mode="rgb_array").render()
-    for wrong in ("up", [[1.0], [1.0, 2.0]], np.zeros(4)):
+    for wrong in ("up", ["up"] * 5, [[1.0], [1.0, 2.0]], np.zeros(4)):
         with pytest.raises(InvalidAction, match=r"^an action is finite numbers of shape \(5,\)"):
             checked(wrong, env.action_space)
     env.close()  # nothing to close
