@@ -67,6 +67,16 @@ def test_without_gymnasium_a_sentence_says_how_to_get_it(monkeypatch: pytest.Mon
         make_vec("pushing", "mujoco")
 
 
+def test_what_is_not_here_or_cannot_do_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(making, "missing", lambda info: f"{info.name} is not here")
+    with pytest.raises(BadInput, match="^mujoco is not here$"):
+        make("pushing", "mujoco")
+    make("pushing", "mujoco", python="p")  # who names an interpreter has it
+    monkeypatch.setattr(PushingToGoal, "problem", lambda self: "no arm can")
+    with pytest.raises(BadInput, match="^no arm can$"):
+        make("pushing", "mujoco", python="p")
+
+
 @pytest.mark.parametrize("name", sorted(set(ADAPTERS) - set(able_to(Capability.OFFSCREEN))))
 def test_what_draws_nothing_says_so(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(making, "missing", lambda info: None)
