@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -19,6 +19,7 @@ from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.cluster import pool as module
 from pytest_simbench.cluster import serving
 from pytest_simbench.cluster.executor import ClusterExecutor
+from pytest_simbench.cluster.job import Packed
 from pytest_simbench.cluster.offers import PYTHON, Node, here, plugin, refusal, unmet
 from pytest_simbench.cluster.pool import TLS, Pool, reason
 from pytest_simbench.cluster.serving import not_taken
@@ -139,6 +140,49 @@ def test_a_head_and_a_node_that_are_told_little(monkeypatch: pytest.MonkeyPatch)
     ]  # fmt: skip
     own = ("tcp://h:1", "here", "vm", 4, ["mujoco"])
     assert serving.node(*own)[1] == own
+
+
+class Client:
+    """Dask's, as far as a pool asks it; the head says after which silence a node is lost."""
+
+    told: ClassVar[dict[str, Any]] = {}
+
+    def __init__(self, *where: Any, **how: Any) -> None:
+        self.done: list[Any] = [(*where, how)]
+        self.subscribe_topic = lambda *what: self.done.append(what)
+        self.close = lambda **how: self.done.append(how)
+        if "down" in where[0]:
+            raise OSError("refused") from TimeoutError("no answer")
+
+    def get_metadata(self, keys: list[str], default: Any) -> Any:
+        return self.told if keys == [module.SETTINGS] else default
+
+    def submit(self, *what: Any, **how: Any) -> None:
+        self.done.append((*what, how))
+
+
+def test_a_pool_joins_a_scheduler_and_sends_a_job_to_one_node(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[Any] = []
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "Client", Client)
+    monkeypatch.setattr(module, "check_security", lambda *role, **how: asked.append((role, how)))
+    pools = [Pool("tcp://h:1")]
+    monkeypatch.setattr(Client, "told", {"lost-after": 2})
+    pools.append(Pool("TLS://h:1"))
+    assert [pool.lost_after for pool in pools] == [module.LOST_AFTER, 2.0]
+    assert asked == [(("client",), {"tls": tls}) for tls in (False, True)]
+    how = {"timeout": 10.0, "set_as_default": False, "name": "pytest-simbench"}
+    done: list[Any] = pools[1]._client.done
+    assert done == [("TLS://h:1", how), (module.node_side.TOPIC, pools[1]._hear)]
+    pools[1].submit("key", A, Packed.of(b"job"), 3)
+    how = {"key": "key", "workers": [A.address], "pure": False, "retries": 0}
+    assert done[2:] == [(module.node_side.run, Packed.of(b"job"), 3, how)]
+    pools[1].close()
+    assert done[3:] == [{"timeout": 5}]
+    with pytest.raises(ExecutorError, match=r"answers at tcp://down .no answer.; start one: simb"):
+        Pool("tcp://down")
 
 
 class Told(Pool):
