@@ -30,8 +30,7 @@ AGAIN = 5.0
 LEAST_TCP = 11.0
 """Dask's least time-out of a connection [s]."""
 
-say = partial(print, flush=True)
-"""What the processes print may go to a file that somebody waits for."""
+say = partial(print, flush=True)  # it may go to a file that somebody waits for
 
 
 def head(
