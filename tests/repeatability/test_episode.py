@@ -7,12 +7,11 @@ from contextlib import contextmanager
 from types import SimpleNamespace
 from typing import Any
 
-from pytest_simbench.repeatability.episode import Episode, Episodes
+from pytest_simbench.repeatability.episode import Episode, Episodes, changed
 from pytest_simbench.repeatability.perturbation import Perturbation, perturbed
 from pytest_simbench.scene import Scene
 from pytest_simbench.tasks.base import Outcome
-from tests.repeatability.scripted import METRICS, Scripted, operation
-from tests.repeatability.test_scripted import moved
+from tests.repeatability.scripted import METRICS, Scripted, moved, operation
 
 WORLD = SimpleNamespace(tape=["done"], motions=["sampled"], left_at=1.5)
 
@@ -48,3 +47,7 @@ def test_what_is_asked_of_a_run_reaches_its_world() -> None:
     episodes.run()
     assert own.asked == [(scene, {"period": 0.02, "play": None, "before": None, "delay": 0})]
     assert performed == [(WORLD, 7, None)] * 2
+
+
+def test_what_counts_as_changed() -> None:
+    assert changed({"a": 1.0, "b": None, "c": 0.5}, {"a": 1.0, "b": 0.0}) == ["b", "c"]

@@ -15,8 +15,7 @@ from pytest_simbench.client.errors import Where, WorkerExited
 from pytest_simbench.experiment.example import Example, ExampleError
 from pytest_simbench.repeatability import example as module
 from pytest_simbench.scene import Pose
-from tests.repeatability.scripted import Scripted, operation
-from tests.repeatability.test_scripted import moved
+from tests.repeatability.scripted import Scripted, moved, operation
 
 TAPE = [operation("wait", "fall", 1.0)]
 

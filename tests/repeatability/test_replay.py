@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -15,6 +16,7 @@ import pytest
 from pytest_simbench.client.errors import Unavailable, Where, WorkerExited
 from pytest_simbench.client.tape import Operation
 from pytest_simbench.experiment.handle import SimulatorHandle
+from pytest_simbench.records.checked import convert
 from pytest_simbench.records.repeatability import Again
 from pytest_simbench.repeatability.episode import Episode, Episodes
 from pytest_simbench.repeatability.motions import difference
@@ -23,8 +25,7 @@ from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Moment, Throwing
 from tests.repeatability.conftest import first_seed
-from tests.repeatability.scripted import NAMES, operation
-from tests.repeatability.test_scripted import ALL, moved
+from tests.repeatability.scripted import ALL, NAMES, moved, operation
 
 EVERYTHING = frozenset(Capability)
 PATIENCE = 20.0
@@ -199,7 +200,7 @@ class Written(SimulatorHandle):
 
 TAPE = [operation("wait", *told) for told in (("fly", 0.1), ("fall", 0.2), ("fly", 0.3))]
 FIRST = replace(moved(0.0), tape=TAPE)
-PARTED = replace(moved(0.001, {**ALL, "standing": 0.5}), left_at=0.7)
+AWAY = replace(moved(0.001, {**ALL, "standing": 0.5}), left_at=0.7)
 WHERE = Where("sim", "headless")
 
 
@@ -223,7 +224,7 @@ class Known:
             raise handle.end
         if isinstance(handle, Written) and handle.end:
             assert handle.closed.wait(PATIENCE)
-        return PARTED if self.handle.done[-1:] == [0.5] else FIRST
+        return AWAY if self.handle.done[-1:] == [0.5] else FIRST
 
 
 def again(**given: Any) -> tuple[Known, Replay]:
@@ -235,7 +236,7 @@ def again(**given: Any) -> tuple[Known, Replay]:
 
 def ways(known: Known, **claimed: bool) -> tuple[Again, ...]:
     """What is found of a simulator that knows that another scene was there."""
-    parted = vars(difference(FIRST.motions, PARTED.motions, NAMES))
+    parted = vars(difference(FIRST.motions, AWAY.motions, NAMES))
     parted |= {"changed": ["standing"], "left_at": 0.7}
     return (
         Again(way="after a reset", changed=[]),
@@ -294,3 +295,58 @@ def test_who_is_interrupted_ends_what_runs_side_by_side() -> None:
     with pytest.raises(KeyboardInterrupt):
         again(own=Written(KeyboardInterrupt()), fresh=others[0], other_mode=others[1], jobs=3)
     assert all(one.closed.is_set() for one in others)
+
+
+PARTED = {"first": 1.25, "body": "a", "growth": {"1": 0.0012, "5": None}, "largest": 0.02}
+
+
+@pytest.mark.parametrize(
+    ("again", "identical", "text"),
+    [
+        (Again(way="w"), True, "bit-identical"),
+        (Again(way="w", left_at=2.5, claimed=False), True, "bit-identical"),
+        (Again(way="w", skipped="no window"), False, "no window"),
+        (Again(way="w", failure="WorkerExited: gone"), False, "WorkerExited: gone"),
+        (
+            Again(way="w", changed=["placed", "hit"], **PARTED),
+            False,
+            "first differs at t = 1.25 s (a), then 1.2 mm 1 s later, 20 mm at most; changed "
+            "placed, hit",
+        ),
+        (
+            Again(way="w", first=1.0, body="", growth={}, largest=0.0),
+            False,
+            "first differs at t = 1.00 s (robot), 0 mm at most",
+        ),
+    ],
+)
+def test_running_again_in_words_and_on_the_wire(again: Again, identical: bool, text: str) -> None:
+    assert (again.identical, again.text) == (identical, text)
+    wire = json.loads(json.dumps(again.to_wire()))
+    assert wire["identical"] is identical
+    assert replace(convert(wire, Again), changed=again.changed) == again
+    del wire["claimed"]
+    assert convert(wire, Again).claimed
+
+
+def test_what_a_claim_of_determinism_means() -> None:
+    fine, skipped = Again(way="reset"), Again(way="window", skipped="none here")
+    parted, hidden = Again(way="fresh", **PARTED), Again(way="restored", claimed=False, **PARTED)
+    broken = Again(way="window", failure="WorkerExited: gone", claimed=False)
+    first = moved(0.0)
+    Replay("sim", True, first, (fine, skipped, hidden)).assert_as_claimed()
+    for claims, ways, bad, head in (
+        (True, (fine, parted), (parted,), "claims to be deterministic, but"),
+        (False, (fine, hidden, broken), (broken,), "could not run again"),
+        (True, (parted, broken), (parted, broken), "claims to be deterministic, but"),
+    ):
+        with pytest.raises(AssertionError) as caught:
+            Replay("sim", claims, first, ways).assert_as_claimed()
+        lines = [f"sim {head}", *(f"  {again.way}: {again.text}" for again in bad)]
+        assert str(caught.value) == "\n".join(lines)
+    wire = Replay("sim", True, first, (fine, parted)).to_wire()
+    assert wire == {
+        "claims": True,
+        "counts": {"standing": 1.0, "lost": 0.0},
+        "again": [fine.to_wire(), parted.to_wire()],
+    }

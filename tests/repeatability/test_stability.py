@@ -18,8 +18,17 @@ from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.repeatability.search import search
 from pytest_simbench.repeatability.stability import Sensitivity, Stability, sensitivity, stability
 from pytest_simbench.tasks.base import Moment
-from tests.repeatability.scripted import Scripted, episode, motion, operation
-from tests.repeatability.test_scripted import ALL, Perturbed, moved, shift, toppling
+from tests.repeatability.scripted import (
+    ALL,
+    Perturbed,
+    Scripted,
+    episode,
+    motion,
+    moved,
+    operation,
+    shift,
+    toppling,
+)
 
 GROWING = [
     # at 0.1 s after the first motion began, at 0.2 s, the cube is 1, 2, ... displacements away
