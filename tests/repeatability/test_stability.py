@@ -173,6 +173,8 @@ def test_stability_of_a_known_world() -> None:
     assert found.same.mean == pytest.approx(found.unchanged / 12)
     again = stability(Scripted(toppling), {"x": 1e-3}, examples=12, at_most=1)
     assert again == found
+    fine = stability(Scripted(lambda p: moved(shift(p))), {"x": 1e-3}, examples=5, at_most=1)
+    assert (fine.kept, fine.unchanged, fine.worst) == ((1.0,) * 5, 5, "")
     other = Scripted(toppling)
     stability(other, {"x": 1e-3}, examples=12, at_most=1, random_seed=1)
     assert other.asked != experiment.asked
