@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import importlib
 import math
+import signal
+from contextlib import suppress
 from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -25,8 +29,8 @@ from pytest_simbench.simulator import (
     heavy,
     lazy_import,
 )
-from pytest_simbench.simulator.base import EYE, LOOK_AT, view_axes
-from pytest_simbench.simulator.info import BEYOND, check_supported
+from pytest_simbench.simulator.base import EYE, LOOK_AT, signals_kept, view_axes
+from pytest_simbench.simulator.info import BEYOND, check_supported, importable, no_module
 from pytest_simbench.testing.faults import mechanisms, true_scene
 from tests.approval import assert_approved_message
 from tests.worker.hosted import Toy
@@ -41,6 +45,46 @@ def test_an_engines_function_is_looked_up_once_and_its_state_each_time(
     assert engine.pi == 3.0
     monkeypatch.delattr(importlib, "import_module")
     assert engine.sqrt(9.0) == 3.0
+
+
+def test_signals_are_put_back_and_versions_are_those_that_are_installed() -> None:
+    """Nothing is imported to be asked for what modules alone have."""
+    before = signal.getsignal(signal.SIGUSR1)
+    with suppress(KeyError), signals_kept(signal.SIGUSR1, signal.SIGUSR2):
+        signal.signal(signal.SIGUSR1, signal.SIG_IGN)
+        raise KeyError
+    assert signal.getsignal(signal.SIGUSR1) == before
+    assert not hasattr(lazy_import("no_such_engine"), "__path__")
+    toy = Toy()
+    toy.info = replace(Toy.info, distribution="numpy")  # type: ignore[misc]
+    assert Simulator.versions(toy) == {"numpy": version("numpy")}
+    toy.info = replace(Toy.info, distribution="no-such-engine")  # type: ignore[misc]
+    assert Simulator.versions(toy) == {}
+
+
+def test_what_is_here_of_an_engine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = {name: importable(name) for name in ("json", "json.decoder", "no_such", "no.such", "")}
+    assert found == {
+        "json": True,
+        "json.decoder": True,
+        "no_such": False,
+        "no.such": False,
+        "": False,
+    }
+    assert no_module(["a|b", "c"]) == "a or b and no module c"
+    info = replace(Toy.info, name="toy", install="get it", program=("TOY", "bin/toy"))
+    monkeypatch.delenv("TOY", raising=False)
+    assert info.no_program == "toy is not here (TOY is not set): get it"
+    monkeypatch.setenv("TOY", str(tmp_path))
+    assert info.no_program == f"toy is not here (TOY is {tmp_path}, which has no bin/toy): get it"
+    (tmp_path / "bin" / "toy").mkdir(parents=True)
+    assert info.no_program
+    monkeypatch.setenv("TOY", str(tmp_path / "bin"))
+    (tmp_path / "bin" / "bin").mkdir()
+    (tmp_path / "bin" / "bin" / "toy").touch()
+    assert info.no_program == replace(info, program=("", "")).no_program == ""
+    assert info.modes == ("headless",)
+    assert replace(info, capabilities=Capability.named("window gpu")).modes == ("headless", "gui")
 
 
 def test_a_world_begins_with_no_steps_and_the_links_that_a_scene_names() -> None:
