@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.client.errors import Diverged, Interrupted, NodeLost, Where, WorkerError
+from pytest_simbench.cluster import job as module
 from pytest_simbench.cluster.executor import ClusterExecutor, _Lost
 from pytest_simbench.cluster.job import Job, Packed, TaskFailed, error_from_wire, error_to_wire
 from pytest_simbench.cluster.node import LatestJobs
@@ -46,6 +47,18 @@ def test_the_experiment_is_the_same_on_the_node(case: Case, tmp_path: Path) -> N
     there = job.experiment(tmp_path)
     assert (job.client, there.case.folder) == ("me", tmp_path)
     assert replace(expected(there, 3), scene="") == replace(expected(experiment, 3), scene="")
+
+
+def test_what_is_of_a_machine_is_the_nodes_own(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = SimpleNamespace(variables=lambda: {"CACHE": "own"})
+    monkeypatch.setattr(module, "interpreter", lambda info: f"python of {info.name}")
+    monkeypatch.setattr(module, "Environment", SimpleNamespace(of=lambda info: own))
+    theirs = replace(case, python="p", spec="s", environment={"A": "1"}, contended=True)
+    there = Job.of(Experiment(theirs, Falling())).experiment(tmp_path / "n", display=None).case
+    told = {"python": "python of mujoco", "environment": {"CACHE": "own"}, "folder": tmp_path / "n"}
+    assert there == replace(case, **told)
 
 
 def of_node(experiment: Experiment, asked: str) -> str:

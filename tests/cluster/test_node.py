@@ -168,6 +168,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Any:
 def test_progress_is_told_when_it_is_another(asked: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def carry_out(job: Any, number: int, slots: int, progress: Any, started: Any) -> Any:
         started(None)
+        assert all(one.daemon for one in threading.enumerate() if "watch" in one.name)
         for step in ({"phase": "fall"}, {"done": 1, "total": 2}):
             asked.heard.clear()
             progress.update(step)
