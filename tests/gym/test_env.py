@@ -283,6 +283,9 @@ def test_joints_go_on_from_the_set_points(monkeypatch: pytest.MonkeyPatch) -> No
         wanted = np.clip(first + way * np.eye(7)[0], env._servo.model.lower, env._servo.model.upper)
         assert command.position == pytest.approx(wanted)
     assert world.done[5:] == ["left"]
+    short, _ = scripted(monkeypatch, AWAY, AWAY, seconds=0.01)
+    short.reset(seed=1)
+    assert short.step(np.zeros(5))[2:4] == (False, True)
 
 
 @pytest.mark.parametrize(("end", "why"), [(GONE, "it is gone"), (OUT, "'block' left the room")])

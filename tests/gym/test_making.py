@@ -40,6 +40,8 @@ def test_what_is_made_of_two_names() -> None:
         ({"rate": 30.1}, "asked every 33.22 ms, which is no multiple of the time step"),
         ({"rate": 0}, "the rate"),
         ({"seconds": 0}, "the seconds of an episode"),
+        ({"jitter": -0.1}, "the jitter"),
+        ({"jitter": float("nan")}, "the jitter"),
         ({"tolerance": float("nan")}, "the tolerance"),
         ({"reward": "much"}, "reward='much': choose from dense, sparse"),
         ({"actions": None}, "actions=None: choose from joints, tool"),

@@ -12,7 +12,7 @@ import pytest
 from gymnasium.error import ClosedEnvironmentError, InvalidAction
 
 from pytest_simbench.gym.making import make_vec
-from tests.gym.scripted import Loop, Written
+from tests.gym.scripted import AWAY, NEAR, Loop, Written
 from tests.gym.test_env import SHORT, made, played
 
 
@@ -56,12 +56,9 @@ def test_side_by_side_nothing_begins_with_too_few_seeds_or_once_closed() -> None
             ask()
 
 
-def test_several_begin_together_and_each_anew_once_it_is_over(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Seeds count from a number on, or are given; one that is masked out is left as it is."""
-    envs = make_vec("pushing", "mujoco", 2, python="p", seconds=0.2)
-    worlds = [Written(*[(0.1 * n + 0.1, 0.0, 0.0)] * 20) for n in range(2)]
+def together(monkeypatch: pytest.MonkeyPatch, seconds: float, *worlds: Written) -> Any:
+    """Environments side by side, of these worlds."""
+    envs = make_vec("pushing", "mujoco", len(worlds), python="p", seconds=seconds)
 
     def loop(process: Any, *more: Any, **given: Any) -> Loop:
         (world,) = (one for one in worlds if one.process is process)
@@ -70,6 +67,24 @@ def test_several_begin_together_and_each_anew_once_it_is_over(
     monkeypatch.setattr("pytest_simbench.gym.env.ClosedLoop", loop)
     for env, world in zip(envs.envs, worlds, strict=True):
         env.env._handle = world
+    return envs
+
+
+def test_who_was_at_the_goal_for_long_enough_begins_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    near, away = Written(*[NEAR] * 9), Written(*[AWAY] * 9)
+    envs = together(monkeypatch, 9.0, near, away)
+    envs.reset(seed=1)
+    ends = [envs.step(np.zeros((2, 5)))[2].tolist() for _ in range(6)]
+    assert ends == [*[[False, False]] * 4, [True, False], [False, False]]
+    assert [len(world.seen) for world in (near, away)] == [1, 7]
+
+
+def test_several_begin_together_and_each_anew_once_it_is_over(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Seeds count from a number on, or are given; one that is masked out is left as it is."""
+    worlds = [Written(*[(0.1 * n + 0.1, 0.0, 0.0)] * 20) for n in range(2)]
+    envs = together(monkeypatch, 0.2, *worlds)
     actions = np.array([[0.5, 0, 0, 0, 1], [-0.5, 0, 0, 0, 1]])
     _, info = envs.reset(seed=np.int64(5))
     assert info["seed"].tolist() == [5, 6]
