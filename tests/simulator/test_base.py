@@ -19,6 +19,7 @@ from pytest_simbench.ground.errors import NotSupportedError, SimulatorError
 from pytest_simbench.laws import LAWS
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Pose, Scene, SceneError
+from pytest_simbench.scene.friction import RULES
 from pytest_simbench.scene.scene import WORDS
 from pytest_simbench.simulator import (
     Capability,
@@ -143,6 +144,7 @@ def test_what_adapters_share(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_facts_of_another_type_are_refused(fact: dict[str, Any], told: str) -> None:
     with pytest.raises(SimulatorError, match=told):
         replace(Toy.info, name="toy", **fact)
+    assert replace(Toy.info, friction_rule="|".join(RULES)).friction_rule
 
 
 @pytest.mark.parametrize("word", BEYOND)
