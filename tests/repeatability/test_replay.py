@@ -234,17 +234,17 @@ def again(**given: Any) -> tuple[Known, Replay]:
     return known, replay(known, **options)  # type: ignore[arg-type]
 
 
-def ways(known: Known, **claimed: bool) -> tuple[Again, ...]:
-    """What is found of a simulator that knows that another scene was there."""
-    parted = vars(difference(FIRST.motions, AWAY.motions, NAMES))
-    parted |= {"changed": ["standing"], "left_at": 0.7}
-    return (
-        Again(way="after a reset", changed=[]),
-        Again(way="after another episode", **parted),
-        Again(way="restored again in flight", **parted),
-        Again(way="fresh process", skipped="no driver"),
-        Again(way="with a window", failure="WorkerExited: it is gone"),
-    )
+APART = {
+    **vars(difference(FIRST.motions, AWAY.motions, NAMES)), "changed": ["standing"], "left_at": 0.7
+}  # fmt: skip
+AGAIN = (
+    Again(way="after a reset", changed=[]),
+    Again(way="after another episode", **APART),
+    Again(way="restored again in flight", **APART),
+    Again(way="fresh process", skipped="no driver"),
+    Again(way="with a window", failure="WorkerExited: it is gone"),
+)
+"""What is found of a simulator that knows that another scene was there."""
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 3])
@@ -260,7 +260,7 @@ def test_all_that_is_run_again(monkeypatch: pytest.MonkeyPatch, jobs: int) -> No
     fresh = Written(Unavailable("no driver", WHERE))
     other = Written(WorkerExited("it is gone", WHERE))
     known, found = again(fresh=fresh, other_mode=other, jobs=jobs)
-    assert found == Replay("sim", True, FIRST, ways(known))
+    assert found == Replay("sim", True, FIRST, AGAIN)
     assert many == [max(1, jobs - 1)]
     assert known.handle.done == [ANOTHER, 0.5]
     asked = [(None, None), *[(TAPE, handle) for handle in (None, None, None, fresh, other)]]
