@@ -1,4 +1,4 @@
-"""What an adapter says of a version of its engine."""
+"""What an adapter says of a version of its engine, and in which scenes its deviations count."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from pytest_simbench.sims.mujoco.adapter import MuJoCo
 
 from pytest_simbench.ground.errors import SimulatorError
 from pytest_simbench.ground.versions import VersionedName
+from pytest_simbench.motion.panda import panda
+from pytest_simbench.scene import Cylinder, Gripper, Pose, Scene
+from pytest_simbench.simulator import FOLLOWER, Deviation
 from pytest_simbench.simulator.registry import UnknownSimulatorError, adapter, address, registered
 
 INFO = replace(
@@ -91,3 +94,33 @@ def test_older_releases_than_were_tried_are_refused_in_one_sentence(name: str) -
     assert re.fullmatch(r"the adapter was tested with .* not with 0\.0\.1", info.refused("0.0.1"))
     with pytest.raises(SimulatorError, match=r"==0\.0\.1: the adapter was tested"):
         adapter(f"{name}==0.0.1")
+
+
+def test_sizes_hold_for_the_robot_they_were_measured_on() -> None:
+    """Another robot may have larger meshes, and fingers of other names."""
+    hull = Deviation("link/*/meshes", "hulls", within=5e-4, elsewhere=1e-3)
+    finger = Deviation(f"joint/{FOLLOWER}/effort_limit", "follows")
+    ur5 = replace(
+        panda(), name="ur5", gripper=Gripper(("panda_joint1", "panda_joint2"), 1.0, 0.0, 1.0)
+    )
+    for robot in (None, panda()):
+        assert hull.with_robot(robot) == hull
+        assert not finger.with_robot(robot).excuses("joint/panda_finger_joint2/effort_limit")
+    assert hull.with_robot(ur5).within == 1e-3
+    assert replace(hull, elsewhere=None).with_robot(ur5).within == 5e-4
+    fingers = Gripper(ur5.joint_names[:3], 1.0, 0.0, 1.0)
+    three = replace(ur5, gripper=fingers, limits=None, swing=None)
+    assert hull.with_robot(three).quantity == hull.quantity
+    assert finger.with_robot(ur5).excuses("joint/panda_joint2/effort_limit")
+    assert not finger.with_robot(ur5).excuses("joint/panda_joint1/effort_limit")
+
+
+def test_some_deviations_count_only_where_a_scene_has_their_word() -> None:
+    bouncing = Deviation("", "it does not bounce", only="restitution")
+    rolling = Deviation("", "it does not roll", only="cylinder")
+    can = Cylinder("can", 0.1, 0.1, Pose.at(0.0, 0.0, 0.05), 1.0)
+    scenes = [Scene("s"), Scene("s", (can,)), Scene("s", (can.changed(restitution=0.5),))]
+    assert [bouncing.concerns(scene) for scene in scenes] == [False, False, True]
+    assert [rolling.concerns(scene) for scene in scenes] == [False, True, True]
+    assert all(Deviation("", "always").concerns(scene) for scene in scenes)
+    assert Scene("s", (can.changed(linear_damping=0.1),)).words == {"cylinder", "damping"}

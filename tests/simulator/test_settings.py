@@ -13,6 +13,7 @@ from pytest_simbench.simulator import Settings, SettingsError
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.simulator.settings import (
     EACH,
+    Each,
     Linear,
     Log,
     changed,
@@ -118,6 +119,7 @@ class Some(Settings):
     first: Annotated[int, Linear(0, 5, when=("third", "a"))] = 3
     second: tuple[float, Annotated[float, Linear(0.5, 4)]] = (0.02, 1.0)
     third: Annotated[Literal["a", "b"], EACH] = "a"
+    fourth: Annotated[bool, Each(when=("third", "a", "b"))] = False
 
 
 @dataclass(frozen=True)
@@ -150,9 +152,11 @@ def test_ranges_are_read_from_the_annotations() -> None:
         "first": "0 to 5 (third a)",
         "second/2": "0.5 to 4",
         "third": "a or b",
+        "fourth": "False or True (third a or b)",
     }
     assert [one.name for one in searched(Some) if one.whole] == ["first"]
     assert changes({"second/2": 3.0, "first": 1}, Some()) == {"second": (0.02, 3.0), "first": 1}
+    assert changes({"second/2": 3.0, "second/1": 5.0}, Some()) == {"second": (5.0, 3.0)}
 
 
 def test_meanings_are_those_of_the_docstring() -> None:
@@ -161,6 +165,7 @@ def test_meanings_are_those_of_the_docstring() -> None:
         "first": "two numbers.",
         "second": "two numbers.",
         "third": "",
+        "fourth": "",
     }
 
 
