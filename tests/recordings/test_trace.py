@@ -93,6 +93,12 @@ def test_what_is_no_trace_is_refused(changes: Any, message: str, tmp_path: Path)
         Trace.read(tmp_path / "x.npz")
 
 
+def test_stamps_may_be_as_late_as_those_of_ros(tmp_path: Path) -> None:
+    late = np.linspace(0.0, 2**31 - 1, 12)
+    spoilt(tmp_path / "x.npz", time=late)
+    assert Trace.read(tmp_path / "x.npz").time.tolist() == late.tolist()
+
+
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
