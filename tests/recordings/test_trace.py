@@ -26,6 +26,7 @@ def test_it_is_read_back_without_the_robots_files(tmp_path: Path) -> None:
     assert kept.figure is not None
     assert read.figure is not None
     np.testing.assert_array_equal(read.time, kept.time)
+    assert {read.time.dtype, read.joints.dtype, read.bodies.dtype} == {np.dtype(float)}
     np.testing.assert_allclose(read.joints, kept.joints, atol=1e-6)
     np.testing.assert_allclose(read.bodies, kept.bodies, atol=1e-6)
     assert (read.joint_names, read.body_names) == (list(kept.joint_names), ["red", "blue"])
