@@ -6,6 +6,7 @@ import io
 import json
 import os
 import pickle
+import select
 import zipfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -37,6 +38,13 @@ def test_what_is_no_file(tmp_path: Path, name: str, said: str) -> None:
     (tmp_path / "loop").symlink_to("loop")
     with pytest.raises(FileError, match=f"cannot read the thing .*{said}"):
         read_file(f"{tmp_path}/{name}" if name[0] != "/" else name, 100, "the thing")
+
+
+def test_what_has_no_kind_is_no_file(tmp_path: Path) -> None:
+    with select.epoll() as poll:
+        (tmp_path / "poll").symlink_to(f"/proc/self/fd/{poll.fileno()}")
+        with pytest.raises(FileError, match="it is no file$"):
+            read_file(tmp_path / "poll", 100)
 
 
 def test_a_file_of_unknown_length_is_bounded_too() -> None:
