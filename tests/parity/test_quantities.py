@@ -239,3 +239,13 @@ def test_shares_of_what_can_be_touched(arm: Robot) -> None:
     }
     still = {"ground", "body/shelf", "link/base"}
     assert all(len(pair) == 2 and not pair <= still for pair in asked)
+
+
+NAMES = "body/free", "link/hand", "link/upper"
+
+
+def test_what_is_kept_apart_does_not_touch(arm: Robot) -> None:
+    apart = ("link/hand", "body/free"), ("ground", "link/upper")
+    found = expected_quantities(Scene("s", (FREE, SHELF), arm, apart=apart), Settings())
+    told = {name: list(found[f"{name}/touches"]) for name in NAMES}
+    assert told == {"body/free": [1, 1, 2 / 3], "link/hand": [1, 0.5, 0], "link/upper": [0, 1, 0]}
