@@ -146,7 +146,8 @@ def test_a_repetition_ends_with_its_record_or_with_what_went_wrong(
         raise error
 
     monkeypatch.setattr(repetition, "_answer", fails)
-    monkeypatch.setattr(module.time, "monotonic", iter([3.0, 5.5]).__next__)
+    clock = SimpleNamespace(monotonic=iter([3.0, 5.5]).__next__)
+    monkeypatch.setattr(module, "time", clock)
     record, ended = repetition.run()
     assert (ended, record.seconds["total"], record.status) == (error, 2.5, "interrupted")
     assert (record.repetition, record.error.type, held) == (2, "OSError", ["held", "held"])

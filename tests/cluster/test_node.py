@@ -46,7 +46,7 @@ class Timer:
 def test_a_bench_is_shared_by_a_case_and_cleared_away(monkeypatch: pytest.MonkeyPatch) -> None:
     """At once, or where starting is costly once nobody has used it for a while."""
     at_exit: list[Any] = []
-    monkeypatch.setattr(module.atexit, "register", at_exit.append)
+    monkeypatch.setattr(module, "atexit", SimpleNamespace(register=at_exit.append))
     timed = SimpleNamespace(**{**vars(threading), "Timer": Timer})
     monkeypatch.setattr(module, "threading", timed)
     monkeypatch.setattr(Timer, "made", [])
