@@ -61,10 +61,8 @@ def check_security(role: str, *, tls: bool) -> None:
     try:
         context = security.get_connection_args(role).get("ssl_context") if tls else ""
     except (OSError, ValueError, TypeError) as error:  # of ssl, too
-        files = (
-            security.tls_ca_file,
-            *(getattr(security, f"tls_{role}_{k}") for k in ("cert", "key")),
-        )
+        names = "tls_ca_file", f"tls_{role}_cert", f"tls_{role}_key"
+        files = (getattr(security, name) for name in names)
         raise ExecutorError(
             f"the certificates for the {role} in Dask's configuration cannot be read "
             f"({', '.join(map(str, files))}): {named(error)}"

@@ -30,6 +30,8 @@ AGAIN = 5.0
 LEAST_TCP = 11.0
 """Dask's least time-out of a connection [s]."""
 
+say = partial(print, flush=True)  # it may go to a file that somebody waits for
+
 
 def head(
     host: str | None, port: int | None, lost_after: float | None, tls: bool, pages: bool
@@ -93,9 +95,9 @@ async def _head(host: str, port: int, lost_after: float, tls: bool, pages: bool)
         dashboard_address=f"{host}:0",
     ) as scheduler:
         scheduler.set_metadata(keys=[SETTINGS], value={"lost-after": lost_after})
-        print(f"the head listens on {scheduler.address}", flush=True)
+        say(f"the head listens on {scheduler.address}")
         if pages:
-            print(f"Dask's pages: http://{host}:{scheduler.http_server.port}", flush=True)
+            say(f"Dask's pages: http://{host}:{scheduler.http_server.port}")
         await _either(scheduler.finished, _told())
 
 
@@ -125,17 +127,17 @@ async def _node(
             dashboard=False,
         ) as nanny:
             this = Node.of(nanny.worker_address or "", name, offers)
-            print(f"{this}; {slots} at once; it serves {address}", flush=True)
+            say(f"{this}; {slots} at once; it serves {address}")
             await nanny.finished()
-            print(f"the head at {address} is gone", flush=True)
+            say(f"the head at {address} is gone")
 
     while not told.is_set():
         try:
             await _either(serve, told)
         except (OSError, RuntimeError, TimeoutError, ValueError) as error:
-            print(not_taken(address, name, error), flush=True)
+            say(not_taken(address, name, error))
         if not told.is_set():
-            print(f"it tries again every {AGAIN:g} s", flush=True)
+            say(f"it tries again every {AGAIN:g} s")
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(told.wait(), AGAIN)
 

@@ -72,8 +72,8 @@ class TaskEnv(gymnasium.Env[Any, Any]):
         weakref.finalize(self, handle.close)  # the newest goes first
         self._loop: ClosedLoop | None = None
         self._picture: Any = None
-        self._observed: dict[str, FloatArray] = {}
-        self._info: dict[str, Any] = {}
+        self._observed: dict[str, FloatArray]
+        self._info: dict[str, Any]
         scene = task.scene(0, Jitter(0.0, 0.0))
         servo = self._servo = Servo(scene)
         joints, self._hand = len(servo.model.robot.joints), servo.model.robot.gripper

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import fields, replace
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -95,10 +96,8 @@ def make(
         raise BadInput(problem)
     if render_mode and Capability.OFFSCREEN not in info.capabilities:
         raise BadInput(f"{simulator} draws no pictures outside a window: leave render_mode out")
-    many = [
-        TaskEnv(chosen, case, rhythm, actions, reward, render_mode) for _ in range(num_envs or 1)
-    ]
-    return many[0] if num_envs is None else TaskVectorEnv(many)
+    made = partial(TaskEnv, chosen, case, rhythm, actions, reward, render_mode)
+    return made() if num_envs is None else TaskVectorEnv([made() for _ in range(num_envs)])
 
 
 def make_vec(task: str | GoalTask, simulator: str, num_envs: int = 1, **options: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import tempfile
@@ -49,10 +50,9 @@ def _replay(example: Example) -> None:
             world.play(example.tape)
             print(f"{case.simulator} {case.mode} {case.profile}, t = {world.time:.3f} s")
             for name, pose in world.poses().items():
-                start = scene.body(name).pose.position
-                moved = sum((a - b) ** 2 for a, b in zip(pose.position, start, strict=True))
+                moved = math.dist(pose.position, scene.body(name).pose.position)
                 x, y, z = pose.position
-                print(f"  {name}: {x:.4f} {y:.4f} {z:.4f} m, {1000 * moved**0.5:.1f} mm moved")
+                print(f"  {name}: {x:.4f} {y:.4f} {z:.4f} m, {1000 * moved:.1f} mm moved")
     finally:
         handle.close()
 

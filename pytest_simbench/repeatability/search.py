@@ -143,7 +143,7 @@ def _kept(task: Task, base: Episode, episode: Episode) -> float:
     for metric in task.metrics:
         before, after = base.counts.get(metric.name), episode.counts.get(metric.name)
         if before and metric.better == "higher":
-            shares.append(min(1.0, (after or 0.0) / before))
+            shares.append((after or 0.0) / before)
     return min(shares)
 
 

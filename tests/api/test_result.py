@@ -15,6 +15,7 @@ import pytest
 import pytest_simbench as simbench
 from pytest_simbench.cli.runs import printed
 from pytest_simbench.records.folder import RunFolder
+from pytest_simbench.records.repeatability import Line, append
 from pytest_simbench.tasks import Stacking
 from tests.approval import assert_approved
 from tests.records.build import record
@@ -124,7 +125,12 @@ def test_records_are_a_frame_where_a_package_makes_one(
 
 
 def test_the_report_is_a_page_or_all_files(write: Write, tmp_path: Path) -> None:
+    """With what lies beside the records, wherever it is written."""
     run = write("run")
+    asked = "search", "t", "one", "headless", "tuned", "stacking", 1, {}, {}
+    append(run.folder, Line(*asked, {"sentence": "0.7 mm topples it"}))  # type: ignore[arg-type]
+    for path in (run.folder, tmp_path / "new" / "mine.html", tmp_path / "all"):
+        assert "0.7 mm topples it" in run.report(path).read_text("utf-8")
     assert run.report() == run.folder / "report.html"
     alone = run.report(tmp_path / "new" / "mine.html").read_text()
     assert alone.startswith("<!DOCTYPE html>")

@@ -23,6 +23,7 @@ from pytest_simbench.motion.registry import find
 from pytest_simbench.records.folder import RunFolder
 from pytest_simbench.records.record import Failure
 from pytest_simbench.scene.policy import LoopError
+from pytest_simbench.simulator.registry import registered
 from pytest_simbench.tasks import Carrying, Stacking, Throwing
 from tests.conftest import workers
 from tests.made_up import MadeUp
@@ -77,6 +78,12 @@ def test_records_are_those_of_a_pytest_run(scripted: dict[str, Any]) -> None:
     assert run.problems == ()
 
 
+@pytest.mark.parametrize("asked", [(), ("all",), ("mujoco,all",)])
+def test_all_are_all_that_are_ready_each_once(scripted: dict[str, Any], asked: Any) -> None:
+    kept = simbench.run(Falling(), *asked, reps=1).contents.records
+    assert [record.simulator for record in kept] == sorted(registered())
+
+
 def test_how_often_is_as_in_pytest(scripted: dict[str, Any]) -> None:
     fast = simbench.run(Falling(), "mujoco").contents.records
     assert {(r.jitter, r.mode, r.profile) for r in fast} == {(1.0, "headless", "tuned")}
@@ -122,8 +129,9 @@ def test_a_simulator_without_a_window_is_told(
     run = simbench.run(Falling(), ("mujoco", "ode"), reps=1, gui=True)
     assert [(r.simulator, r.mode) for r in run.contents.records] == [("mujoco", "gui")]
     assert run.problems == ("ode has no window",)
-    with pytest.raises(simbench.BadInput, match="nothing was simulated: ode has no window"):
-        simbench.run(Falling(), "ode", reps=1, gui=True)
+    two = "nothing was simulated: ode has no window; ovphysx has no window$"
+    with pytest.raises(simbench.BadInput, match=two):
+        simbench.run(Falling(), "ode,ovphysx", reps=1, gui=True)
 
 
 @pytest.mark.parametrize("fault", [KeyboardInterrupt, ZeroDivisionError])

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from pytest_simbench.client.errors import Diverged, Interrupted, NodeLost, Where, WorkerError
+from pytest_simbench.cluster import job as module
 from pytest_simbench.cluster.executor import ClusterExecutor, _Lost
 from pytest_simbench.cluster.job import Job, Packed, TaskFailed, error_from_wire, error_to_wire
 from pytest_simbench.cluster.node import LatestJobs
@@ -34,6 +35,7 @@ from pytest_simbench.motion.registry import find
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Failure
 from pytest_simbench.scene import Scene
+from pytest_simbench.scene.policy import Function
 from pytest_simbench.tasks import Holding, Reaching, Settling, Stacking
 from tests.cluster.test_pool import A, B, Told, lab
 from tests.tiny import Falling
@@ -45,6 +47,18 @@ def test_the_experiment_is_the_same_on_the_node(case: Case, tmp_path: Path) -> N
     there = job.experiment(tmp_path)
     assert (job.client, there.case.folder) == ("me", tmp_path)
     assert replace(expected(there, 3), scene="") == replace(expected(experiment, 3), scene="")
+
+
+def test_what_is_of_a_machine_is_the_nodes_own(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = SimpleNamespace(variables=lambda: {"CACHE": "own"})
+    monkeypatch.setattr(module, "interpreter", lambda info: f"python of {info.name}")
+    monkeypatch.setattr(module, "Environment", SimpleNamespace(of=lambda info: own))
+    theirs = replace(case, python="p", spec="s", environment={"A": "1"}, contended=True)
+    there = Job.of(Experiment(theirs, Falling())).experiment(tmp_path / "n", display=None).case
+    told = {"python": "python of mujoco", "environment": {"CACHE": "own"}, "folder": tmp_path / "n"}
+    assert there == replace(case, **told)
 
 
 def of_node(experiment: Experiment, asked: str) -> str:
@@ -75,6 +89,29 @@ def test_so_does_the_policy_of_a_file(case: Case, tmp_path: Path, name: str) -> 
     )
     (policy,) = read_policies(path, name)
     assert of_node(Experiment(case, Reaching(policy)), "task.policy.act(3)") == "3"
+
+
+class Still:
+    name = "still"
+
+    def act(self, seen: Any) -> Any:
+        return seen
+
+
+def unmoved(seen: Any) -> Any:
+    return seen
+
+
+@pytest.mark.parametrize("task", [Reaching(Still()), Reaching(Function(unmoved)), Falling(0.2)])
+def test_what_is_the_tests_own_travels_as_code(
+    case: Case, monkeypatch: pytest.MonkeyPatch, task: Any
+) -> None:
+    """And nothing else; afterwards cloudpickle sends as before."""
+    cloudpickle, sent, left = pytest.importorskip("cloudpickle"), list[Any](), list[Any]()
+    monkeypatch.setattr(cloudpickle, "register_pickle_by_value", sent.append)
+    monkeypatch.setattr(cloudpickle, "unregister_pickle_by_value", left.append)
+    Job.of(Experiment(case, task)).pack()
+    assert sent == left == [sys.modules["tests.tiny" if isinstance(task, Falling) else __name__]]
 
 
 def test_a_class_that_travelled_can_be_derived_from(case: Case) -> None:

@@ -9,13 +9,17 @@ import time
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import pytest
 
 from pytest_simbench.cli.main import main
+from pytest_simbench.client.errors import ExecutorError
 from pytest_simbench.cluster import pool as module
 from pytest_simbench.cluster import serving
 from pytest_simbench.cluster.executor import ClusterExecutor
+from pytest_simbench.cluster.job import Packed
 from pytest_simbench.cluster.offers import PYTHON, Node, here, plugin, refusal, unmet
 from pytest_simbench.cluster.pool import TLS, Pool, reason
 from pytest_simbench.cluster.serving import not_taken
@@ -138,6 +142,49 @@ def test_a_head_and_a_node_that_are_told_little(monkeypatch: pytest.MonkeyPatch)
     assert serving.node(*own)[1] == own
 
 
+class Client:
+    """Dask's, as far as a pool asks it; the head says after which silence a node is lost."""
+
+    told: ClassVar[dict[str, Any]] = {}
+
+    def __init__(self, *where: Any, **how: Any) -> None:
+        self.done: list[Any] = [(*where, how)]
+        self.subscribe_topic = lambda *what: self.done.append(what)
+        self.close = lambda **how: self.done.append(how)
+        if "down" in where[0]:
+            raise OSError("refused") from TimeoutError("no answer")
+
+    def get_metadata(self, keys: list[str], default: Any) -> Any:
+        return self.told if keys == [module.SETTINGS] else default
+
+    def submit(self, *what: Any, **how: Any) -> None:
+        self.done.append((*what, how))
+
+
+def test_a_pool_joins_a_scheduler_and_sends_a_job_to_one_node(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[Any] = []
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(distributed, "Client", Client)
+    monkeypatch.setattr(module, "check_security", lambda *role, **how: asked.append((role, how)))
+    pools = [Pool("tcp://h:1")]
+    monkeypatch.setattr(Client, "told", {"lost-after": 2})
+    pools.append(Pool("TLS://h:1"))
+    assert [pool.lost_after for pool in pools] == [module.LOST_AFTER, 2.0]
+    assert asked == [(("client",), {"tls": tls}) for tls in (False, True)]
+    how = {"timeout": 10.0, "set_as_default": False, "name": "pytest-simbench"}
+    done: list[Any] = pools[1]._client.done
+    assert done == [("TLS://h:1", how), (module.node_side.TOPIC, pools[1]._hear)]
+    pools[1].submit("key", A, Packed.of(b"job"), 3)
+    how = {"key": "key", "workers": [A.address], "pure": False, "retries": 0}
+    assert done[2:] == [(module.node_side.run, Packed.of(b"job"), 3, how)]
+    pools[1].close()
+    assert done[3:] == [{"timeout": 5}]
+    with pytest.raises(ExecutorError, match=r"answers at tcp://down .no answer.; start one: simb"):
+        Pool("tcp://down")
+
+
 class Told(Pool):
     """Knows what it is told, and asks no scheduler."""
 
@@ -193,6 +240,86 @@ def test_a_node_that_joins_with_another_version_is_left_out_and_told(case: Case)
     assert told[1].startswith(
         "late got no repetition: it runs pytest-simbench 0.2, and this is 0.1"
     )
+
+
+class Asked(Pool):
+    """Asks a scheduler that is written down, of the nodes a, and b and c without a simulator."""
+
+    def __init__(self) -> None:
+        self._begin()
+        self.address, self.lost_after = "tcp://head", 5.0
+        self.heard = dict.fromkeys("abc", 1.0)
+        self.busy: dict[str, list[str]] = {}
+        self._client = SimpleNamespace(  # type: ignore[assignment]
+            status="running", scheduler_info=self.info, processing=lambda: self.busy
+        )
+
+    def info(self, n_workers: int) -> Any:
+        offers = {"a": [PLUGIN, "simbench", "mujoco==4.0"], "b": ["simbench"], "c": ["GPU"]}
+        told = {
+            f"tcp://{k}:1": {"name": k, "resources": dict.fromkeys(offers[k], 2.0), "last_seen": at}
+            for k, at in self.heard.items()
+        }
+        return {"workers": told if n_workers == -1 else {}}
+
+
+def test_nodes_are_those_that_the_scheduler_has_heard_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By this machine's clock; what is known stays so for a moment."""
+    now = [100.0]
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    pool = Asked()
+    a, b = pool.nodes()
+    assert (a.name, a.slots, b.name, pool.began["mujoco"]) == ("a", 2, "b", "4.0")
+    pool._mine = {"k1": a.address}
+    pool.busy = {a.address: ["k1", "k2", "k3"], b.address: []}
+    now[0] += module.LOOK_PERIOD / 2
+    assert (pool.nodes(), pool._others) == ((a, b), {})
+    now[0] += module.LOOK_PERIOD
+    pool.heard["a"] = 2.0
+    assert (pool.nodes(), pool._others) == ((a, b), {a.address: 2, b.address: 0})
+    assert [pool._free(node) for node in (a, b)] == [-1, 2]
+    now[0] = 105.0  # b was heard of at 100
+    assert pool.lives(b)
+    now[0] = 105.3
+    assert (pool.lives(a), pool.lives(b), pool.nodes()) == (True, False, (a,))
+    pool.heard |= {"a": 3.0, "b": 2.0}
+    now[0] = 105.6
+    assert pool.nodes() == (a, b)
+    pool.give_up(b)
+    now[0] = 106.0
+    assert pool.nodes() == (a,)
+    del pool.heard["b"]
+    now[0] = 107.0
+    assert pool.nodes() == (a,)
+    assert {*pool._seen} == {"tcp://a:1", "tcp://c:1"}
+    pool.began = {"mujoco": "3.0"}  # stays, whoever comes
+    now[0] = 108.0
+    assert (pool.nodes(), pool.began) == ((a,), {"mujoco": "3.0"})
+
+    def fails(n_workers: int) -> None:
+        raise OSError("broken pipe")
+
+    pool._client.scheduler_info = fails
+    now[0] = 109.0
+    with pytest.raises(ExecutorError, match=r"^the scheduler at tcp://head is gone .broken pipe.;"):
+        pool.nodes()
+    pool._client.status = "closed"
+    with pytest.raises(ExecutorError, match="^the scheduler at tcp://head is gone; the records so"):
+        pool.nodes()
+
+
+def test_progress_is_that_of_jobs_under_way_and_ends_with_them() -> None:
+    pool = Told([A])
+    pool._mine = {"mine": A.address}
+    for key in ("mine", "other"):
+        pool._hear((1.0, {"key": key, "done": 3}))
+    assert (pool.progress("mine"), pool.progress("other")) == ({"key": "mine", "done": 3}, {})
+    ended: list[Any] = []
+    for done in (False, True):
+        future: Any = SimpleNamespace(done=lambda d=done: d, cancel=lambda **how: ended.append(how))
+        pool.release("mine", future)
+    assert (pool.progress("mine"), pool._mine) == ({}, {})
+    assert ended == [{"reason": "nobody waits for it any more", "force": True}]
 
 
 def test_waiting_ends_when_the_run_does() -> None:

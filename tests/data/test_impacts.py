@@ -110,6 +110,7 @@ def test_a_file_is_read_and_halves_are_of_even_and_odd_tosses(tmp_path: Path, na
         (edited("state", np.zeros((2, 40, 5))), r"the shape \(2, 40, 5\), not \(2, rows, 6\)"),
         (edited("state", np.zeros((2, 19, 6))), "too few rows"),
         (edited("state", np.full((2, 40, 6), np.nan)), "too large or no numbers"),
+        (edited("state", np.full((2, 40, 6), -100.0)), "too large or no numbers"),
     ],
 )
 def test_other_arrays_are_one_sentence(

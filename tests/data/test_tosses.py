@@ -32,6 +32,11 @@ def test_files_are_joined_and_halves_are_of_even_and_odd_numbers(folder: Path) -
     assert len(found.half("all")) == 3
 
 
+def test_states_of_single_precision_are_read_in_double(tmp_path: Path) -> None:
+    tosses.write(tmp_path / "contactnets_cube_tosses.npz", [0], [falling().astype(np.float32)])
+    assert tosses.read(tmp_path).items[0].state.dtype == float
+
+
 def test_sets_are_equal_when_their_tosses_are(folder: Path) -> None:
     one, other = tosses.read(folder), tosses.read(folder)
     assert one == other
@@ -66,6 +71,7 @@ def arrays() -> dict[str, Any]:
         (edited("state", falling(4)), r"state has the shape \(4, 13\).*ask for 5 rows of 13"),
         (edited("state", np.full((5, 13), np.nan)), "no numbers, too large, or no rotation"),
         (edited("state", np.zeros((5, 13))), "no rotation"),
+        (edited("state", np.tile([0.0, 0, -100, 1, *[0] * 9], (5, 1))), "too large"),
     ],
 )
 def test_arrays_that_are_no_tosses_are_one_sentence(

@@ -6,14 +6,17 @@ import io
 import json
 import os
 import pickle
+import select
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pytest_simbench.ground import files
 from pytest_simbench.ground.files import FileError, read_arrays, read_file, read_json
 
 
@@ -37,9 +40,49 @@ def test_what_is_no_file(tmp_path: Path, name: str, said: str) -> None:
         read_file(f"{tmp_path}/{name}" if name[0] != "/" else name, 100, "the thing")
 
 
+def test_what_has_no_kind_is_no_file(tmp_path: Path) -> None:
+    with select.epoll() as poll:
+        (tmp_path / "poll").symlink_to(f"/proc/self/fd/{poll.fileno()}")
+        with pytest.raises(FileError, match="it is no file$"):
+            read_file(tmp_path / "poll", 100)
+
+
 def test_a_file_of_unknown_length_is_bounded_too() -> None:
     with pytest.raises(FileError, match="larger than"):
         read_file("/proc/self/status", 10)  # says that it has no bytes
+
+
+def test_what_takes_the_place_of_a_file_that_was_looked_at_is_no_trap(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A pipe is not waited for, and of what is endless no more is read than it takes to tell."""
+    (tmp_path / "a").write_bytes(b"12345")
+    os.mkfifo(tmp_path / "pipe")
+    looked, flags, sizes = os.stat(tmp_path / "a"), list[int](), list[int]()
+
+    def opened(path: Path, how: int) -> int:
+        flags.append(how)
+        return os.open(path, how | os.O_NONBLOCK)
+
+    class Endless(io.BytesIO):
+        fileno = staticmethod(lambda: 0)
+
+        def read(self, size: int | None = None) -> bytes:
+            sizes.append(size or 0)
+            return b"x" * (size or 0)
+
+    told = {"stat": lambda path: looked, "open": opened}
+    monkeypatch.setattr(files, "os", SimpleNamespace(**{**vars(os), **told}))
+    with pytest.raises(FileError, match="it is a pipe"):
+        read_file(tmp_path / "pipe", 5)
+    assert flags == [os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC]
+    monkeypatch.setattr(files.os, "fstat", lambda number: looked)
+    monkeypatch.setattr(
+        files, "open", lambda number, mode: Endless(os.close(number)), raising=False
+    )
+    with pytest.raises(FileError, match="larger than"):
+        read_file(tmp_path / "a", 5)
+    assert sizes == [6]
 
 
 @given(st.recursive(st.none() | st.booleans() | st.integers() | st.text()

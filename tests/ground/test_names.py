@@ -42,7 +42,9 @@ def test_plain_names_stay(text: str) -> None:
     assert file_name(text) == text
 
 
-@pytest.mark.parametrize("text", ["..", ".", "", "../../victim", "/etc/passwd", "a\0b", "x" * 999])
+@pytest.mark.parametrize(
+    "text", ["..", ".", "", "../../victim", "/etc/passwd", "a\0b", "\udcff", "x" * 999]
+)
 def test_nothing_leads_anywhere(text: str, tmp_path: Path) -> None:
     path = tmp_path / f"{file_name(text)}.log"
     path.touch()
@@ -63,10 +65,11 @@ def test_what_is_left_of_a_name_word_by_word() -> None:
 
 def test_numbers_are_alike_where_processors_differ() -> None:
     """Of about 500, and of 0. What is no number stays, and so does an infinite one."""
-    here = {"k": [545.150123097334, {"x": 6.6e-24}], "far": float("-inf"), "n": 3, "t": ("a", None)}
+    same = {"far": float("-inf"), "n": 3, "t": ("a", None, Path("b"))}
+    here = {"k": [545.150123097334, {"x": 6.6e-24}], **same}
     there = {**here, "k": [545.150123097335, {"x": -1e-17}]}
     assert data_digest(here, 16) == data_digest(there, 16)
-    told = '{"far": -Infinity, "k": [545.1501231, {"x": 0.0}], "n": 3, "t": ["a", null]}'
+    told = '{"far": -Infinity, "k": [545.1501231, {"x": 0.0}], "n": 3, "t": ["a", null, "b"]}'
     assert data_digest(there, 9) == hashlib.sha256(told.encode()).hexdigest()[:9]
     other = [{**here, "k": [545.1501232, {"x": x}]} for x in (0.0, 2e-12)]
     assert len({data_digest(one, 12) for one in (here, *other)}) == 3

@@ -18,25 +18,22 @@ import gymnasium
 import numpy as np
 import psutil
 import pytest
-from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded, UnsupportedMode
+from gymnasium.error import InvalidAction, ResetNeeded, UnsupportedMode
 from gymnasium.utils.env_checker import check_env
 
-import pytest_simbench
-from pytest_simbench.cli.values import BadInput
 from pytest_simbench.client.closed_loop import Looking
 from pytest_simbench.client.environments import missing
-from pytest_simbench.client.errors import Unavailable
-from pytest_simbench.gym import IDS, making
+from pytest_simbench.client.errors import Unavailable, WorkerExited
 from pytest_simbench.gym.env import checked
-from pytest_simbench.gym.making import RATE, make, make_vec
+from pytest_simbench.gym.making import make
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Scene
 from pytest_simbench.scene.policy import Rhythm
-from pytest_simbench.simulator import Capability
 from pytest_simbench.simulator.registry import adapter
 from pytest_simbench.tasks.base import Jitter
 from pytest_simbench.tasks.goals import PushingToGoal, Reaching
-from tests.conftest import ADAPTERS, able_to, workers
+from tests.conftest import ADAPTERS, workers
+from tests.gym.scripted import AWAY, GONE, NEAR, OUT, TASK, plain, scripted, told_of
 
 REAL = np.dtype("float64")
 HOW = "headless", "tuned", "p", "pushing_to_goal"
@@ -205,34 +202,6 @@ def test_nothing_is_left_of_an_environment_that_nobody_closed() -> None:
     assert not any(psutil.pid_exists(int(pid)) for pid in ended.stdout.split())
 
 
-@pytest.mark.engine
-def test_several_at_once_are_as_one_after_the_other() -> None:
-    actions = np.random.default_rng(2).uniform(-1, 1, (7, 2, 5))
-    with made("pushing", num_envs=2, **SHORT) as envs:
-        assert envs.metadata["autoreset_mode"] is gymnasium.vector.AutoresetMode.NEXT_STEP
-        steps = played(envs, 5, actions)
-        assert steps[0][0] in envs.observation_space
-        assert steps[4][3].all()
-        assert not steps[5][3].any()
-        assert (steps[5][1] == 0).all()
-        os.kill(envs.envs[1].env._handle._process.pid, signal.SIGKILL)
-        *_, truncated, infos = envs.step(actions[0])
-        assert truncated.tolist() == [False, True]
-        assert "SIGKILL" in infos["crashed"][1]
-        with pytest.raises(InvalidAction):
-            envs.step(actions[0, 0])
-    with made("pushing", **SHORT) as env:
-        for k in range(2):
-            single = played(env, 5 + k, actions[:4, k])
-            seen, info = env.reset()
-            single += [(seen, 0.0, False, False, info), *(env.step(row) for row in actions[5:, k])]
-            for one, many in zip(single, steps, strict=True):
-                for name, row in one[0].items():
-                    np.testing.assert_array_equal(many[0][name][k], row)
-                if many is not steps[0]:
-                    assert [told[k] for told in many[1:4]] == list(one[1:4])
-
-
 def test_what_an_action_commands_and_a_place_is_worth() -> None:
     """In a tenth of a second, and in a twentieth; none of it needs a worker."""
     places, goal = [[0.02, 0.0, 0.0], [0.0, 0.021, 0.0]], np.zeros(3)
@@ -252,7 +221,6 @@ def test_what_an_action_commands_and_a_place_is_worth() -> None:
     assert env.compute_reward(places, goal, {}).tolist() == [0.0, -1.0]
     env = make("pushing", "mujoco", render_mode="rgb_array")
     assert (env.render_mode, env._looking) == ("rgb_array", Looking(picture=(480, 480)))
-    assert make_vec("pushing", "mujoco", 2).num_envs == 2
     delays = {"command_latency": 0.05, "observation_delay": 0.1}
     env = make("reaching", "mujoco", actions="joints", seconds=1.0, rate=20.0, **delays)
     assert (env._jitter, env.rhythm) == (Jitter(), Rhythm(20.0, 0.05, 0.1))
@@ -274,75 +242,86 @@ def test_what_is_asked_too_early_is_refused() -> None:
         env.render()
     with pytest.raises(ResetNeeded, match=r"^no picture was taken yet: call reset\(\)$"):
         make("pushing", "mujoco", python="p", render_mode="rgb_array").render()
-    for wrong in ("up", [[1.0], [1.0, 2.0]], np.zeros(4)):
+    for wrong in ("up", ["up"] * 5, [[1.0], [1.0, 2.0]], np.zeros(4)):
         with pytest.raises(InvalidAction, match=r"^an action is finite numbers of shape \(5,\)"):
             checked(wrong, env.action_space)
     env.close()  # nothing to close
 
 
-def test_side_by_side_nothing_begins_with_too_few_seeds_or_once_closed() -> None:
-    envs = make_vec("pushing", "mujoco", 2, python="p")
-    for seeds in ([1], [1, 2, 3]):
-        with pytest.raises(ValueError, match="^seed=.*: give one number, or one for each of 2 env"):
-            envs.reset(seed=seeds)
-    assert not any(hasattr(env, "coming") for env in envs.envs)
-    envs.close()
-    for ask in (envs.reset, lambda: envs.step(np.zeros((2, 5)))):
-        with pytest.raises(ClosedEnvironmentError, match="^these environments are closed: make"):
-            ask()
+def test_an_episode_from_its_first_look_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is terminated once the block was at its goal for half a second, as it is now; what is
+    seen and rewarded may be older."""
+    env, world = scripted(monkeypatch, AWAY, *[NEAR] * 6, seconds=2.0, render_mode="rgb_array")
+    seen, info = env.reset(seed=3)
+    scene = TASK.scene(3, Jitter())
+    assert world.done == [scene, "settle start", 0.2]
+    assert (world.process.deadline, world.process.where.seed) == (None, 3)
+    assert world.process.where.phase == "act"
+    assert world.given == {
+        "process": world.process, "scene": scene, "rhythm": Rhythm(10.0), "timestep": 0.001,
+        "seconds": pytest.approx(2.1), "kinematics": env._servo, "looking": env._looking,
+        "goal": TASK.goal(3),
+    }  # fmt: skip
+    assert (plain(seen), info) == told_of(world, 3, 0, 0.0)[::2]
+    assert env.render()[0, 0, 0] == 0
+    for k in range(1, 7):
+        seen, reward, terminated, truncated, info = env.step([0.0, 0.1 * k, 0.0, 0.0, 1.0])
+        assert (plain(seen), reward, info) == told_of(world, 3, k, -0.05 if k == 1 else -0.01)
+        assert (terminated, truncated) == (k == 6, False)
+        assert world.done[2 + k].tool_change == pytest.approx((0, 0.005 * k, 0, 0, 0, 0))
+        assert env.render()[0, 0, 0] == k
+    assert world.done[9:] == ["left"]
 
 
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
-        ({"task": "juggling"}, "task='juggling': choose from pick_and_place, pushing, reaching"),
-        ({"task": 3}, "task=3: choose from"),
-        ({"simulator": "none"}, "unknown simulator 'none'; choose from"),
-        ({"rate": 30.1}, "asked every 33.22 ms, which is no multiple of the time step"),
-        ({"rate": 0}, "the rate"),
-        ({"seconds": 0}, "the seconds of an episode"),
-        ({"tolerance": float("nan")}, "the tolerance"),
-        ({"reward": "much"}, "reward='much': choose from dense, sparse"),
-        ({"actions": None}, "actions=None: choose from joints, tool"),
-        ({"render_mode": "human"}, "render_mode='human': choose from None, rgb_array"),
-        ({"profile": "best"}, "best"),
-        ({"robot": "nobody"}, "unknown robot 'nobody'"),
-        ({"colour": 1}, "parameter='colour': choose from command_latency, observation_delay"),
-        ({"settle": 1.0}, "parameter='settle': choose from"),  # an episode has no such end
-        ({"num_envs": 0}, "num_envs=0: give a whole number from 1 on"),
-    ],
-    ids=str,
-)
-def test_bad_input_is_one_sentence(options: dict[str, Any], told: str) -> None:
-    with pytest.raises(BadInput) as caught:
-        make(**{"task": "pushing", "simulator": "mujoco", **options})
-    assert told in str(caught.value)
-    assert "\n" not in str(caught.value)
+def test_joints_go_on_from_the_set_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    env, world = scripted(monkeypatch, *[AWAY] * 3, seconds=0.2, actions="joints")
+    env.reset(seed=1)
+    ends = [env.step([1.0, *np.zeros(7)])[2:4] for _ in range(2)]
+    assert ends == [(False, False), (False, True)]  # its time is over
+    first = world.seen[0].told[0][:7]
+    for command, way in zip(world.done[3:], (0.1, 0.2), strict=False):
+        wanted = np.clip(first + way * np.eye(7)[0], env._servo.model.lower, env._servo.model.upper)
+        assert command.position == pytest.approx(wanted)
+    assert world.done[5:] == ["left"]
+    short, _ = scripted(monkeypatch, AWAY, AWAY, seconds=0.01)
+    short.reset(seed=1)
+    assert short.step(np.zeros(5))[2:4] == (False, True)
 
 
-def test_without_gymnasium_a_sentence_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(making, "find_spec", lambda name: None)
-    with pytest.raises(BadInput, match=r"pip install 'pytest-simbench\[gym\]'"):
-        pytest_simbench.make("pushing", "mujoco")
-    with pytest.raises(BadInput, match=r"pip install 'pytest-simbench\[gym\]'"):
-        make_vec("pushing", "mujoco")
+@pytest.mark.parametrize(("end", "why"), [(GONE, "it is gone"), (OUT, "'block' left the room")])
+def test_a_crash_ends_the_episode_and_its_worker(
+    monkeypatch: pytest.MonkeyPatch, end: Any, why: str
+) -> None:
+    """Its time is over with the same step: it has crashed all the same."""
+    env, world = scripted(monkeypatch, AWAY, end, NEAR, seconds=0.1)
+    before, was = env.reset(seed=2)
+    seen, reward, terminated, truncated, info = env.step(np.zeros(5))
+    assert (plain(seen), info["crashed"][: len(why)]) == (plain(before), why)
+    assert {**info, "crashed": 0} == {**was, "crashed": 0}
+    assert all(seen[name] is not before[name] for name in seen)
+    assert (reward, terminated, truncated) == (pytest.approx(-0.05), False, True)
+    assert world.done[-2:] == ["left", "closed"]
 
 
-@pytest.mark.parametrize("name", sorted(set(ADAPTERS) - set(able_to(Capability.OFFSCREEN))))
-def test_what_draws_nothing_says_so(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(making, "missing", lambda info: None)
-    with pytest.raises(BadInput, match="draws no pictures"):
-        make(PushingToGoal(None), name, render_mode="rgb_array")
-    assert make("pushing", name).metadata["render_modes"] == []
+def test_an_interrupt_leaves_no_answer_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    env, world = scripted(monkeypatch, AWAY, KeyboardInterrupt())
+    env.reset(seed=2)
+    with pytest.raises(KeyboardInterrupt):
+        env.step(np.zeros(5))
+    assert world.done[-2:] == ["left", "closed"]
 
 
-def test_the_default_rate_is_whole_steps_of_every_engine() -> None:
-    for name in ADAPTERS:
-        Rhythm(RATE).steps(adapter(name).profiles["tuned"].timestep)
-
-
-def test_gymnasium_knows_the_ids() -> None:
-    for name, task in IDS.items():
-        spec = gymnasium.spec(f"simbench/{name}")
-        assert spec.kwargs == {"task": task}
-        assert task in making.TASKS
+def test_a_reset_is_tried_twice_and_draws_a_seed_of_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    env, world = scripted(monkeypatch, GONE, AWAY, AWAY, AWAY, AWAY, GONE, GONE)
+    env.reset(seed=4)
+    scene = TASK.scene(4, Jitter())
+    assert world.done == [scene, "closed", scene, "settle start", 0.2]
+    seeds = [env.reset()[1]["seed"] for _ in range(2)]
+    again = [env.reset(seed=4)[1]["seed"], int(np.random.default_rng(4).integers(2**31))]
+    assert again == [4, seeds[0]]
+    assert seeds[0] != seeds[1]
+    assert world.done.count("left") == 3
+    with pytest.raises(WorkerExited, match="it is gone"):
+        env.reset()

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from pytest_simbench.description.shapes import DIRECTIONS
-from pytest_simbench.motion.panda import panda
 from pytest_simbench.parity.compare import Lasting, check, compare, misfit
 from pytest_simbench.parity.quantities import constants
 from pytest_simbench.parity.readback import one_value
-from pytest_simbench.scene import Box, Cylinder, Gripper, Pose, Scene
-from pytest_simbench.simulator import FOLLOWER, Deviation, ParityError
+from pytest_simbench.scene import Box, Pose, Scene
+from pytest_simbench.simulator import Deviation, ParityError
 
 SOFT = Deviation("", "contacts are soft")
 NO_ROTOR = Deviation("joint/*/armature", "no rotor inertia")
@@ -147,36 +146,6 @@ def test_a_difference_of_just_the_declared_size_is_excused() -> None:
     assert not compare({"gravity": 1.0}, {"gravity": 1.5}, (half,), "sim").wrong
     assert compare({"gravity": 1.0}, {"gravity": 1.5000001}, (half,), "sim").wrong
     assert compare({"gravity": 1.0}, {"gravity": 0.0}, (half,), "sim").wrong
-
-
-def test_sizes_hold_for_the_robot_they_were_measured_on() -> None:
-    """Another robot may have larger meshes, and fingers of other names."""
-    hull = Deviation("link/*/meshes", "hulls", within=5e-4, elsewhere=1e-3)
-    finger = Deviation(f"joint/{FOLLOWER}/effort_limit", "follows")
-    ur5 = replace(
-        panda(), name="ur5", gripper=Gripper(("panda_joint1", "panda_joint2"), 1.0, 0.0, 1.0)
-    )
-    for robot in (None, panda()):
-        assert hull.with_robot(robot) == hull
-        assert not finger.with_robot(robot).excuses("joint/panda_finger_joint2/effort_limit")
-    assert hull.with_robot(ur5).within == 1e-3
-    assert replace(hull, elsewhere=None).with_robot(ur5).within == 5e-4
-    fingers = Gripper(ur5.joint_names[:3], 1.0, 0.0, 1.0)
-    three = replace(ur5, gripper=fingers, limits=None, swing=None)
-    assert hull.with_robot(three).quantity == hull.quantity
-    assert finger.with_robot(ur5).excuses("joint/panda_joint2/effort_limit")
-    assert not finger.with_robot(ur5).excuses("joint/panda_joint1/effort_limit")
-
-
-def test_some_deviations_count_only_where_a_scene_has_their_word() -> None:
-    bouncing = Deviation("", "it does not bounce", only="restitution")
-    rolling = Deviation("", "it does not roll", only="cylinder")
-    can = Cylinder("can", 0.1, 0.1, Pose.at(0.0, 0.0, 0.05), 1.0)
-    scenes = [Scene("s"), Scene("s", (can,)), Scene("s", (can.changed(restitution=0.5),))]
-    assert [bouncing.concerns(scene) for scene in scenes] == [False, False, True]
-    assert [rolling.concerns(scene) for scene in scenes] == [False, True, True]
-    assert all(Deviation("", "always").concerns(scene) for scene in scenes)
-    assert Scene("s", (can.changed(linear_damping=0.1),)).words == {"cylinder", "damping"}
 
 
 def test_a_body_touches_elsewhere_by_its_reach_and_its_margin_across() -> None:

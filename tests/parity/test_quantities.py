@@ -13,6 +13,7 @@ import pytest
 from pytest_simbench.description.shapes import DIRECTIONS
 from pytest_simbench.parity.quantities import expected_quantities, touches
 from pytest_simbench.scene import Box, Capsule, FloatArray, Joint, Pose, Robot, Scene
+from pytest_simbench.scene.robot import FREE as LOOSE
 from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.simulator.settings import Settings
 from tests.description.test_urdf_check import SOUND, described
@@ -186,6 +187,33 @@ def test_settings_change_what_they_name_and_add_nothing(arm: Robot) -> None:
     assert_quantities(expected_quantities(scene, Damped(0.004)), wanted)
 
 
+class Braked(Settings):
+    def quantities(self) -> Mapping[str, Any]:
+        return {f"joint/*/{name}": 7 for name in ("stiffness", "damping", "friction")}
+
+
+def test_a_motor_and_a_joints_own_friction_are_not_the_settings_and_springs_add_up(
+    arm: Robot,
+) -> None:
+    shoulder, slide, end = arm.joints
+    joints = (
+        replace(shoulder, stiffness=0.0, damping=0.0),
+        replace(slide, friction=0.5),
+        replace(end, spring=2.0, rest=0.25, passive_damping=3.0),
+    )
+    found = expected_quantities(Scene("s", (), replace(arm, joints=joints)), Braked(0.004))
+    told = [
+        [
+            float(found[f"joint/{joint.name}/{name}"])
+            for name in ("stiffness", "damping", "friction")
+        ]
+        for joint in joints
+    ]
+    assert told == [[LOOSE, 0, 7], [7, 7, 0.5], [9, 10, 7]]
+    assert [name for name in found if "rest" in name and "joint" in name] == ["joint/end/rest"]
+    assert found["joint/end/rest"] == 0.25
+
+
 def test_a_bodys_own_damping_replaces_that_of_the_settings() -> None:
     braked = FREE.changed(linear_damping=0.7)
     found = expected_quantities(Scene("s", (braked,)), Damped(0.004))
@@ -211,3 +239,13 @@ def test_shares_of_what_can_be_touched(arm: Robot) -> None:
     }
     still = {"ground", "body/shelf", "link/base"}
     assert all(len(pair) == 2 and not pair <= still for pair in asked)
+
+
+NAMES = "body/free", "link/hand", "link/upper"
+
+
+def test_what_is_kept_apart_does_not_touch(arm: Robot) -> None:
+    apart = ("link/hand", "body/free"), ("ground", "link/upper")
+    found = expected_quantities(Scene("s", (FREE, SHELF), arm, apart=apart), Settings())
+    told = {name: list(found[f"{name}/touches"]) for name in NAMES}
+    assert told == {"body/free": [1, 1, 2 / 3], "link/hand": [1, 0.5, 0], "link/upper": [0, 1, 0]}

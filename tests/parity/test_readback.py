@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,8 @@ class Adapter:
         self.scene: Any = TRUE
         self.robot: Any = TRUE.robot
         self.first, self.helper = Helper(self), Helper(self)
-        self.settings = Settings()
+        self.settings, self.engine = Settings(), ModuleType("engine")
+        vars(self.engine)["scene"] = TRUE
 
 
 def test_everything_remembered_is_replaced_and_put_back_also_after_an_error() -> None:
@@ -45,6 +46,7 @@ def test_everything_remembered_is_replaced_and_put_back_also_after_an_error() ->
         assert adapter.robot is OTHER.robot
         assert adapter.helper.cube is adapter.first.cube is OTHER.body("cube")
         assert adapter.helper.prepared is not prepared
+        assert adapter.engine.scene is TRUE  # that is none of its own
         raise KeyError("planned")
     assert adapter.scene is TRUE
     assert adapter.helper.prepared is prepared

@@ -143,6 +143,6 @@ def test_what_cannot_be_written_is_told(tmp_path: Path) -> None:
 
 
 def test_what_is_missing_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(film, "find_spec", lambda name: None)
+    monkeypatch.setattr(film, "find_spec", lambda name: None if name == "av" else name)
     with pytest.raises(FilmsUnavailable, match=r"pip install 'pytest-simbench\[video\]'"):
         film.check_available()

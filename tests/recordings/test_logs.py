@@ -107,6 +107,13 @@ def test_uneven_times_become_even_ones(tmp_path: Path) -> None:
     assert log.trajectory.position[:, 0] == pytest.approx(np.arange(7) * 0.1)
 
 
+def test_a_log_may_be_as_short_long_and_far_as_is_said(tmp_path: Path) -> None:
+    for lasts in (logs.SHORTEST, logs.LONGEST):
+        time, far = np.linspace(0.0, lasts, 21), np.full(21, -logs.FARTHEST)
+        log = read_log(npz(tmp_path, time=time, hinge=far), SCENE)
+        assert log.trajectory.duration == pytest.approx(lasts)
+
+
 def test_a_start_out_of_range_is_the_nearest_end_and_commands_are_as_logged(tmp_path: Path) -> None:
     log = read_log(npz(tmp_path, time=TIME, slider=TIME + 1.2), SCENE)
     assert log.start.positions == (0.0, 1.0)
@@ -153,6 +160,13 @@ def test_a_recording_of_ours_is_read_back(
     monkeypatch.setattr(logs, "MOST", 3)
     with pytest.raises(DescriptionError, match="is no recording: it holds more than 3 messages"):
         read_log(tmp_path / "run" / "run.mcap", world)
+
+
+def test_a_recording_has_a_number_for_each_name(tmp_path: Path) -> None:
+    kept = trace()
+    write_bag(replace(kept, joint_names=[*kept.joint_names, "wrist"]), tmp_path / "run")
+    with pytest.raises(DescriptionError, match="is no recording: zip.. argument 2 is shorter"):
+        read_log(tmp_path / "run" / "run.mcap", scene())
 
 
 @pytest.mark.parametrize(

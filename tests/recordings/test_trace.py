@@ -26,6 +26,7 @@ def test_it_is_read_back_without_the_robots_files(tmp_path: Path) -> None:
     assert kept.figure is not None
     assert read.figure is not None
     np.testing.assert_array_equal(read.time, kept.time)
+    assert {read.time.dtype, read.joints.dtype, read.bodies.dtype} == {np.dtype(float)}
     np.testing.assert_allclose(read.joints, kept.joints, atol=1e-6)
     np.testing.assert_allclose(read.bodies, kept.bodies, atol=1e-6)
     assert (read.joint_names, read.body_names) == (list(kept.joint_names), ["red", "blue"])
@@ -91,6 +92,12 @@ def test_what_is_no_trace_is_refused(changes: Any, message: str, tmp_path: Path)
     spoilt(tmp_path / "x.npz", **changes)
     with pytest.raises(TraceError, match=message):
         Trace.read(tmp_path / "x.npz")
+
+
+def test_stamps_may_be_as_late_as_those_of_ros(tmp_path: Path) -> None:
+    late = np.linspace(0.0, 2**31 - 1, 12)
+    spoilt(tmp_path / "x.npz", time=late)
+    assert Trace.read(tmp_path / "x.npz").time.tolist() == late.tolist()
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from pytest_simbench.client.answers import Constructed
+from pytest_simbench.client.errors import Where, WorkerError, WorkerExited
 from pytest_simbench.client.motion import Motion
 from pytest_simbench.client.tape import Operation, Tape
 from pytest_simbench.records.metrics import Metric
@@ -98,3 +99,29 @@ class Scripted:
     def run(self, perturbations: Sequence[Perturbation] = (), *, play: Any = None) -> Episode:
         self.asked.append((tuple(perturbations), play))
         return self._run(tuple(perturbations))
+
+
+ALL = {"standing": 1.0, "lost": 0.0, "height": 0.3}
+Perturbed = tuple[Perturbation, ...]
+
+
+def shift(perturbed: Perturbed) -> float:
+    """Displacement of cube a in x [m]."""
+    return sum(p.amount for p in perturbed if p.quantity == "x" and p.body == "a")
+
+
+def moved(x: float, metrics: dict[str, float | None] = ALL, **details: object) -> Episode:
+    """Cube a starts `x` farther than 0.1 and goes 0.2 + 3 x; cube b stays."""
+    motions = [motion([0.0], [0.1 + x], [0.5]), motion([0.5, 1.0], [0.2, 0.3 + 4 * x], [0.5, 0.5])]
+    return episode(metrics, motions, [operation("wait", "fall", 1.0)], details)
+
+
+def dead(perturbed: Perturbed) -> WorkerError:
+    return WorkerExited("it is gone", Where("sim", "headless"))
+
+
+def toppling(perturbed: Perturbed) -> Episode:
+    """Beyond 0.5 mm one of four falls, beyond 0.8 mm another."""
+    x = abs(shift(perturbed))
+    fallen = ["one"] * (x > 4.5e-4) + ["two"] * (x > 7.5e-4)
+    return moved(shift(perturbed), {**ALL, "standing": 1 - len(fallen) / 4}, toppled=fallen)

@@ -110,6 +110,11 @@ def test_kept_and_read_back(tmp_path: Path) -> None:
     assert read.counts == {"n": 1.0}
     assert np.array_equal(read.asked, kept.asked, equal_nan=True)
     assert [len(motion) for motion in read.motions] == [1, 4]
+    none = replace(
+        kept, motions=kept.motions[:1], asked=np.zeros((0, 3))
+    )  # a task that asks nothing
+    none.save(tmp_path, "none.npz")
+    assert [len(motion) for motion in Sample.load(tmp_path / "none.npz").motions] == [1]
     pairs = [(a.first, a.second) for a in agreements(tmp_path)]
     assert pairs == [("a", "b"), ("b", "a")]
     assert agreements(tmp_path / "nothing") == []

@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from pytest_simbench.client.errors import Unavailable, Where, WorkerExited
+from pytest_simbench.client.tape import Operation
 from pytest_simbench.experiment.handle import SimulatorHandle
-from pytest_simbench.repeatability.episode import Episodes
-from pytest_simbench.repeatability.replay import Replay, replay
+from pytest_simbench.records.checked import convert
+from pytest_simbench.records.repeatability import Again
+from pytest_simbench.repeatability.episode import Episode, Episodes
+from pytest_simbench.repeatability.motions import difference
+from pytest_simbench.repeatability.replay import ANOTHER, Replay, replay
+from pytest_simbench.scene import Scene
 from pytest_simbench.simulator import Capability
 from pytest_simbench.tasks import Moment, Throwing
 from tests.repeatability.conftest import first_seed
+from tests.repeatability.scripted import ALL, NAMES, moved, operation
 
 EVERYTHING = frozenset(Capability)
+PATIENCE = 20.0
+"""For what takes milliseconds, on a machine that is busy [s]."""
+
 MOMENTS = (Moment("in flight", "fly"),)
 WAYS = (
     "after a reset",
@@ -161,3 +176,177 @@ def test_an_interrupt_ends_what_runs_side_by_side(
     with pytest.raises(KeyboardInterrupt):
         replayed(fresh=workers[0], other_mode=workers[1], jobs=3)
     assert [handle._process for handle in workers] == [None, None]
+
+
+class Written(SimulatorHandle):
+    """A handle without a worker: what is done with it is written down, and `end` says what becomes
+    of its runs."""
+
+    def __init__(self, end: Any = None, mode: str = "headless") -> None:
+        super().__init__(SimpleNamespace(simulator="sim", mode=mode))  # type: ignore[arg-type]
+        self.end, self.done = end, []
+        self.closed = threading.Event()
+
+    @contextmanager
+    def episode(self, scene: Scene, **options: Any) -> Iterator[Any]:
+        self.done.append(scene)
+        if self.end is not None:
+            raise self.end
+        yield SimpleNamespace(wait=self.done.append)
+
+    def close(self) -> None:
+        self.closed.set()
+
+
+TAPE = [operation("wait", *told) for told in (("fly", 0.1), ("fall", 0.2), ("fly", 0.3))]
+FIRST = replace(moved(0.0), tape=TAPE)
+AWAY = replace(moved(0.001, {**ALL, "standing": 0.5}), left_at=0.7)
+WHERE = Where("sim", "headless")
+
+
+class Known:
+    """Episodes that are written down: the first one, and how it ends when it is run again."""
+
+    task = SimpleNamespace(name="scripted", moments=(Moment("again in flight", "fly", 1),))
+
+    def __init__(self, own: Written) -> None:
+        self.handle, self.told = own, []
+
+    def run(self, *, play: Any = None, before: Any = None, handle: Any = None) -> Episode:
+        self.told.append((play, handle))
+        world: Any = SimpleNamespace(
+            **{k: lambda what, k=k: self.told.append((k, what)) for k in ("save", "restore")},
+            perform=self.told.append,
+        )
+        for asked in play if before else ():
+            before(world, asked)
+        if isinstance(handle, Written) and isinstance(handle.end, Exception):
+            raise handle.end
+        if isinstance(handle, Written) and handle.end:
+            assert handle.closed.wait(PATIENCE)
+        return AWAY if self.handle.done[-1:] == [0.5] else FIRST
+
+
+def again(**given: Any) -> tuple[Known, Replay]:
+    """Of known episodes in a simulator that claims all, run again in every way."""
+    known = Known(given.pop("own", Written()))
+    options = {"capabilities": EVERYTHING, "fresh": Written(), "other_mode": "no display", **given}
+    return known, replay(known, **options)  # type: ignore[arg-type]
+
+
+APART = {
+    **vars(difference(FIRST.motions, AWAY.motions, NAMES)), "changed": ["standing"], "left_at": 0.7
+}  # fmt: skip
+AGAIN = (
+    Again(way="after a reset", changed=[]),
+    Again(way="after another episode", **APART),
+    Again(way="restored again in flight", **APART),
+    Again(way="fresh process", skipped="no driver"),
+    Again(way="with a window", failure="WorkerExited: it is gone"),
+)
+"""What is found of a simulator that knows that another scene was there."""
+
+
+@pytest.mark.parametrize("jobs", [1, 2, 3])
+def test_all_that_is_run_again(monkeypatch: pytest.MonkeyPatch, jobs: int) -> None:
+    """With the first one's commands, and what is done in between is what should not matter."""
+    many: list[int] = []
+
+    def pool(most: int, **named: str) -> ThreadPoolExecutor:
+        many.append(most)
+        return ThreadPoolExecutor(most, **named)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("pytest_simbench.repeatability.replay.ThreadPoolExecutor", pool)
+    fresh = Written(Unavailable("no driver", WHERE))
+    other = Written(WorkerExited("it is gone", WHERE))
+    known, found = again(fresh=fresh, other_mode=other, jobs=jobs)
+    assert found == Replay("sim", True, FIRST, AGAIN)
+    assert many == [max(1, jobs - 1)]
+    assert known.handle.done == [ANOTHER, 0.5]
+    asked = [(None, None), *[(TAPE, handle) for handle in (None, None, None, fresh, other)]]
+    saved = [
+        ("save", "replay"),
+        TAPE[2],
+        Operation("wait", {"duration": 0.3}),
+        ("restore", "replay"),
+    ]
+    if jobs == 1:
+        assert known.told == [*asked[:4], *saved, *asked[4:]]
+    assert sorted(map(str, known.told)) == sorted(map(str, [*asked, *saved]))
+
+
+def test_what_is_claimed_of_it() -> None:
+    every, restoring = EVERYTHING - {Capability.DETERMINISTIC}, "restored again in flight"
+    assert [one.claimed for one in again(capabilities=every)[1].again] == [False] * 5
+    found = again(capabilities=EVERYTHING - {Capability.EXACT_RESTORE}, own=Written(mode="gui"))[1]
+    assert {one.way for one in found.again if not one.claimed} == {restoring}
+    assert found.again[-1] == Again(way="headless", skipped="no display")
+    _, found = again(capabilities=EVERYTHING - {Capability.SAVE_RESTORE}, moments=MOMENTS)
+    assert found.again[2] == Again(way="restored in flight", skipped="sim cannot save and restore")
+    for moments, told in (
+        ((), Again(way="restored", skipped="the task 'scripted' declares no moments")),
+        ((Moment("x", "fly", 2),), Again(way="restored x", skipped="the task never came to fly")),
+    ):
+        assert again(moments=moments)[1].again[2] == told
+
+
+def test_who_is_interrupted_ends_what_runs_side_by_side() -> None:
+    others = [Written("waits until it is closed") for _ in range(2)]
+    with pytest.raises(KeyboardInterrupt):
+        again(own=Written(KeyboardInterrupt()), fresh=others[0], other_mode=others[1], jobs=3)
+    assert all(one.closed.is_set() for one in others)
+
+
+PARTED = {"first": 1.25, "body": "a", "growth": {"1": 0.0012, "5": None}, "largest": 0.02}
+
+
+@pytest.mark.parametrize(
+    ("again", "identical", "text"),
+    [
+        (Again(way="w"), True, "bit-identical"),
+        (Again(way="w", left_at=2.5, claimed=False), True, "bit-identical"),
+        (Again(way="w", skipped="no window"), False, "no window"),
+        (Again(way="w", failure="WorkerExited: gone"), False, "WorkerExited: gone"),
+        (
+            Again(way="w", changed=["placed", "hit"], **PARTED),
+            False,
+            "first differs at t = 1.25 s (a), then 1.2 mm 1 s later, 20 mm at most; changed "
+            "placed, hit",
+        ),
+        (
+            Again(way="w", first=1.0, body="", growth={}, largest=0.0),
+            False,
+            "first differs at t = 1.00 s (robot), 0 mm at most",
+        ),
+    ],
+)
+def test_running_again_in_words_and_on_the_wire(again: Again, identical: bool, text: str) -> None:
+    assert (again.identical, again.text) == (identical, text)
+    wire = json.loads(json.dumps(again.to_wire()))
+    assert wire["identical"] is identical
+    assert replace(convert(wire, Again), changed=again.changed) == again
+    del wire["claimed"]
+    assert convert(wire, Again).claimed
+
+
+def test_what_a_claim_of_determinism_means() -> None:
+    fine, skipped = Again(way="reset"), Again(way="window", skipped="none here")
+    parted, hidden = Again(way="fresh", **PARTED), Again(way="restored", claimed=False, **PARTED)
+    broken = Again(way="window", failure="WorkerExited: gone", claimed=False)
+    first = moved(0.0)
+    Replay("sim", True, first, (fine, skipped, hidden)).assert_as_claimed()
+    for claims, ways, bad, head in (
+        (True, (fine, parted), (parted,), "claims to be deterministic, but"),
+        (False, (fine, hidden, broken), (broken,), "could not run again"),
+        (True, (parted, broken), (parted, broken), "claims to be deterministic, but"),
+    ):
+        with pytest.raises(AssertionError) as caught:
+            Replay("sim", claims, first, ways).assert_as_claimed()
+        lines = [f"sim {head}", *(f"  {again.way}: {again.text}" for again in bad)]
+        assert str(caught.value) == "\n".join(lines)
+    wire = Replay("sim", True, first, (fine, parted)).to_wire()
+    assert wire == {
+        "claims": True,
+        "counts": {"standing": 1.0, "lost": 0.0},
+        "again": [fine.to_wire(), parted.to_wire()],
+    }

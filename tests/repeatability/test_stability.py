@@ -18,8 +18,17 @@ from pytest_simbench.repeatability.perturbation import Perturbation
 from pytest_simbench.repeatability.search import search
 from pytest_simbench.repeatability.stability import Sensitivity, Stability, sensitivity, stability
 from pytest_simbench.tasks.base import Moment
-from tests.repeatability.scripted import Scripted, episode, motion, operation
-from tests.repeatability.test_scripted import ALL, Perturbed, moved, shift, toppling
+from tests.repeatability.scripted import (
+    ALL,
+    Perturbed,
+    Scripted,
+    episode,
+    motion,
+    moved,
+    operation,
+    shift,
+    toppling,
+)
 
 GROWING = [
     # at 0.1 s after the first motion began, at 0.2 s, the cube is 1, 2, ... displacements away
@@ -164,6 +173,8 @@ def test_stability_of_a_known_world() -> None:
     assert found.same.mean == pytest.approx(found.unchanged / 12)
     again = stability(Scripted(toppling), {"x": 1e-3}, examples=12, at_most=1)
     assert again == found
+    fine = stability(Scripted(lambda p: moved(shift(p))), {"x": 1e-3}, examples=5, at_most=1)
+    assert (fine.kept, fine.unchanged, fine.worst) == ((1.0,) * 5, 5, "")
     other = Scripted(toppling)
     stability(other, {"x": 1e-3}, examples=12, at_most=1, random_seed=1)
     assert other.asked != experiment.asked

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import importlib
 import math
+import signal
+from contextlib import suppress
 from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +19,7 @@ from pytest_simbench.ground.errors import NotSupportedError, SimulatorError
 from pytest_simbench.laws import LAWS
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Box, Pose, Scene, SceneError
+from pytest_simbench.scene.friction import RULES
 from pytest_simbench.scene.scene import WORDS
 from pytest_simbench.simulator import (
     Capability,
@@ -24,7 +30,8 @@ from pytest_simbench.simulator import (
     heavy,
     lazy_import,
 )
-from pytest_simbench.simulator.base import EYE, LOOK_AT, view_axes
+from pytest_simbench.simulator.base import EYE, LOOK_AT, signals_kept, view_axes
+from pytest_simbench.simulator.info import BEYOND, check_supported, importable, no_module
 from pytest_simbench.testing.faults import mechanisms, true_scene
 from tests.approval import assert_approved_message
 from tests.worker.hosted import Toy
@@ -39,6 +46,46 @@ def test_an_engines_function_is_looked_up_once_and_its_state_each_time(
     assert engine.pi == 3.0
     monkeypatch.delattr(importlib, "import_module")
     assert engine.sqrt(9.0) == 3.0
+
+
+def test_signals_are_put_back_and_versions_are_those_that_are_installed() -> None:
+    """Nothing is imported to be asked for what modules alone have."""
+    before = signal.getsignal(signal.SIGUSR1)
+    with suppress(KeyError), signals_kept(signal.SIGUSR1, signal.SIGUSR2):
+        signal.signal(signal.SIGUSR1, signal.SIG_IGN)
+        raise KeyError
+    assert signal.getsignal(signal.SIGUSR1) == before
+    assert not hasattr(lazy_import("no_such_engine"), "__path__")
+    toy = Toy()
+    toy.info = replace(Toy.info, distribution="numpy")  # type: ignore[misc]
+    assert Simulator.versions(toy) == {"numpy": version("numpy")}
+    toy.info = replace(Toy.info, distribution="no-such-engine")  # type: ignore[misc]
+    assert Simulator.versions(toy) == {}
+
+
+def test_what_is_here_of_an_engine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = {name: importable(name) for name in ("json", "json.decoder", "no_such", "no.such", "")}
+    assert found == {
+        "json": True,
+        "json.decoder": True,
+        "no_such": False,
+        "no.such": False,
+        "": False,
+    }
+    assert no_module(["a|b", "c"]) == "a or b and no module c"
+    info = replace(Toy.info, name="toy", install="get it", program=("TOY", "bin/toy"))
+    monkeypatch.delenv("TOY", raising=False)
+    assert info.no_program == "toy is not here (TOY is not set): get it"
+    monkeypatch.setenv("TOY", str(tmp_path))
+    assert info.no_program == f"toy is not here (TOY is {tmp_path}, which has no bin/toy): get it"
+    (tmp_path / "bin" / "toy").mkdir(parents=True)
+    assert info.no_program
+    monkeypatch.setenv("TOY", str(tmp_path / "bin"))
+    (tmp_path / "bin" / "bin").mkdir()
+    (tmp_path / "bin" / "bin" / "toy").touch()
+    assert info.no_program == replace(info, program=("", "")).no_program == ""
+    assert info.modes == ("headless",)
+    assert replace(info, capabilities=Capability.named("window gpu")).modes == ("headless", "gui")
 
 
 def test_a_world_begins_with_no_steps_and_the_links_that_a_scene_names() -> None:
@@ -97,6 +144,18 @@ def test_what_adapters_share(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_facts_of_another_type_are_refused(fact: dict[str, Any], told: str) -> None:
     with pytest.raises(SimulatorError, match=told):
         replace(Toy.info, name="toy", **fact)
+    assert replace(Toy.info, friction_rule="|".join(RULES)).friction_rule
+
+
+@pytest.mark.parametrize("word", BEYOND)
+def test_a_scene_beyond_an_engine_is_refused(word: str) -> None:
+    able = replace(Toy.info, capabilities=frozenset(Capability))
+    less = replace(able, capabilities=able.capabilities - {BEYOND[word][0]})
+    scene: Any = SimpleNamespace(name="s", words=frozenset({word}))
+    check_supported(able, scene)
+    check_supported(less, Scene("s"))
+    with pytest.raises(NotSupportedError, match=f"^{able.name} .* scene 's' "):
+        check_supported(less, scene)
 
 
 def test_a_deviation_counts_in_scenes_that_there_are() -> None:

@@ -222,3 +222,16 @@ def test_what_is_asked_to_end_and_does_not_is_killed_with_its_children(tmp_path:
     assert program.ended() == "was killed by SIGKILL"
     assert not group(program.pid)
     program.end(lambda: None, 0.3)  # once more does nothing
+
+
+def test_what_ends_when_it_is_asked_is_not_killed_whatever_the_asking_says(tmp_path: Path) -> None:
+    script = 'trap "exit 7" TERM; echo ready; while :; do sleep 0.05; done'
+    program = Program("It", ["/bin/sh", "-c", script], tmp_path)
+    program.wait_until(lambda: "ready" in program.words(), PATIENCE)
+
+    def ask() -> None:
+        os.kill(program.pid, signal.SIGTERM)
+        raise EOFError
+
+    program.end(ask, PATIENCE)
+    assert program.ended() == "exited with status 7"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,7 @@ def test_a_file_changes_a_profile(tmp_path: Path) -> None:
 def test_a_file_may_change_nothing(tmp_path: Path) -> None:
     found = read_profile(written(tmp_path, 'simulator = "mujoco"\nbase = "tuned"\n'))
     assert (found.changes, found.chosen_on) == ({}, ())
+    assert read_profile(written(tmp_path, 'simulator = "mujoco"\n')).base == "default"
 
 
 def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
@@ -57,8 +59,9 @@ def test_two_files_of_one_name_are_told_apart(tmp_path: Path) -> None:
 
 def test_what_is_written_is_read_again(tmp_path: Path) -> None:
     by = 'a "quoted"\nname \U0001f600'
-    chosen = {"by": by, "seeds": [["stacking", 7, 9]], "versions": {"a-b": "1"}}
+    chosen = {"by": by, "seeds": [["stacking", 7, 9]], "versions": {"a-b": "1", "c": "2"}}
     text = write_profile("tuned", "mujoco", {"timestep": 0.004, "solref": (0.01, 1.0)}, chosen)
+    assert tomllib.loads(text)["chosen"] == chosen
     assert read_profile(written(tmp_path, text)) == read_profile(written(tmp_path, TEXT))
     text = write_profile("default", "ovphysx", {"contact_offset": None}, {})
     assert read_profile(written(tmp_path, text)).settings().contact_offset is None

@@ -13,11 +13,13 @@ from pytest_simbench.simulator import Settings, SettingsError
 from pytest_simbench.simulator.registry import adapter, registered
 from pytest_simbench.simulator.settings import (
     EACH,
+    Each,
     Linear,
     Log,
     changed,
     changes,
     flaw,
+    in_words,
     meanings,
     searched,
 )
@@ -88,6 +90,16 @@ def test_every_profile_of_every_engine_has_a_time_step_that_is_fine_enough() -> 
             assert 0 < changed(settings, settings.to_wire(), name).timestep <= 1 / 60
 
 
+def test_settings_are_taken_as_they_are_told() -> None:
+    """`simbench list --settings` says None of some, and 0.016667 s: neither was taken."""
+    for name in registered():
+        for settings in adapter(name).profiles.values():
+            told = {key: in_words(value) for key, value in settings.to_wire().items()}
+            found = changed(settings, told, name).to_wire()
+            assert {key: in_words(value) for key, value in found.items()} == told
+    assert in_words((0.123456, True, ("a", None))) == "0.12346/True/a/None"
+
+
 def test_settings_travel_and_come_back() -> None:
     tuned = MuJoCo.profiles["tuned"]
     assert changed(MuJoCoSettings(), tuned.to_wire(), "mujoco") == tuned
@@ -107,6 +119,7 @@ class Some(Settings):
     first: Annotated[int, Linear(0, 5, when=("third", "a"))] = 3
     second: tuple[float, Annotated[float, Linear(0.5, 4)]] = (0.02, 1.0)
     third: Annotated[Literal["a", "b"], EACH] = "a"
+    fourth: Annotated[bool, Each(when=("third", "a", "b"))] = False
 
 
 @dataclass(frozen=True)
@@ -139,9 +152,11 @@ def test_ranges_are_read_from_the_annotations() -> None:
         "first": "0 to 5 (third a)",
         "second/2": "0.5 to 4",
         "third": "a or b",
+        "fourth": "False or True (third a or b)",
     }
     assert [one.name for one in searched(Some) if one.whole] == ["first"]
     assert changes({"second/2": 3.0, "first": 1}, Some()) == {"second": (0.02, 3.0), "first": 1}
+    assert changes({"second/2": 3.0, "second/1": 5.0}, Some()) == {"second": (5.0, 3.0)}
 
 
 def test_meanings_are_those_of_the_docstring() -> None:
@@ -150,6 +165,7 @@ def test_meanings_are_those_of_the_docstring() -> None:
         "first": "two numbers.",
         "second": "two numbers.",
         "third": "",
+        "fourth": "",
     }
 
 
