@@ -14,7 +14,7 @@ from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.experiment.scene_file import SceneFile, read_scene_file
-from pytest_simbench.scene import Coupling, Polytope
+from pytest_simbench.scene import Coupling, Gripper, Polytope
 from pytest_simbench.scene.robot import FASTEST, FREE, WIDEST
 from pytest_simbench.simulator import DescriptionError
 from tests.approval import assert_approved
@@ -75,6 +75,7 @@ def test_joints_have_no_drives_and_the_dynamics_of_the_file(tmp_path: Path) -> N
     }  # fmt: skip
     assert prepared.velocity_limits == {"rail": FASTEST, "hinge": FASTEST}
     assert [len(link.shapes) for link in prepared.moving_links] == [1, 2]  # with its handle
+    assert scene.robot.gripper == Gripper((), 0.0, 0.0, 0.0)
     assert (scene.name, scene.file) == ("cabinet", str(tmp_path / "cabinet.urdf"))
 
 
