@@ -185,6 +185,8 @@ def test_rows_are_ranked_only_where_the_same_was_asked() -> None:
     real, paper = (series([replace(ours, profile="real", **of)])[0] for of in ({}, {"jitter": 9.0}))
     assert comparable(rows[0], real, profiles=True)
     assert not comparable(rows[0], paper, profiles=True)
+    swept = series([ours, replace(ours, settings={"timestep": 9.0})])  # each has a label
+    assert all(comparable(row, series([other])[0]) for row in swept)
     runs = [record(1, test=f"test_{n}[{s}]", simulator=s) for s in "ab" for n in "xy"]
     found = {(row.key.simulator, row.label): row for row in series(runs)}
     assert comparable(found["a", "test_x"], found["b", "test_x"])
