@@ -25,7 +25,7 @@ from tests.approval import assert_approved
 from tests.made_up_world import MadeUp
 
 LEFT_OUT = """
-    fresh_processes_agree imports_without_engine parity_of_full_scene planted_faults_are_seen
+    fresh_processes_agree imports_without_engine planted_faults_are_seen
     read_back_is_the_engines reading_changes_nothing reused_process_agrees thrown_cube_flies_free
     time_advances unknown_setting_rejected window_changes_nothing worlds_leave_no_memory
 """
