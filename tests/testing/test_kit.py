@@ -81,6 +81,19 @@ def test_an_unknown_setting_must_be_refused_with_those_that_there_are() -> None:
             law(Answering(MuJoCo, said=said))
 
 
+@pytest.mark.parametrize("costly", [True, False])
+def test_a_worker_gets_what_its_engine_needs(monkeypatch: pytest.MonkeyPatch, costly: bool) -> None:
+    info = replace(MuJoCo.info, name="own", costly_start=costly, compile_timeout=77.0)
+    own = type("Own", (MuJoCo,), {"info": info, "__module__": "some.where"})
+    monkeypatch.setattr(subject, "WorkerProcess", lambda *given: given)
+    for gui, mode in ((True, "gui"), (False, "headless")):
+        launch, where = Subject(own, python="/opt/python").launch(gui=gui)  # type: ignore[misc]
+        assert (launch.adapter, launch.python) == ("some.where:Own", "/opt/python")
+        assert (launch.stall_timeout, launch.compile_timeout) == (120.0, 77.0 if costly else 0.0)
+        assert launch.log.name.startswith("own-")
+        assert where == Where("own", mode)
+
+
 def test_shared_workers_are_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     living, dead = Mock(alive=True), Mock(alive=False)
     shared = {(None, "a", "a"): living, (None, "b", "b"): dead}
