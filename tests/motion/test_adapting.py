@@ -25,14 +25,9 @@ from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.tasks import Pushing
 from tests.conftest import measured
-from tests.motion.small_arm import TOML, URDF, small_arm
+from tests.motion.small_arm import TOML, URDF, small_arm, still
 
-TOUCHING = TOML[: TOML.index("[hand]")] + '[hand]\ntool_frame = "grip"\n'
 MICO = Path(__file__).parents[2] / "docs" / "extending" / "mico2.toml"
-
-
-def still(left: float, right: float) -> str:
-    return f"{TOUCHING}\n[locked]\nleft_finger = {left}\nright_finger = {right}\n"
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=8)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.grasping import grasping
 from pytest_simbench.motion.grips import SLACK, Ungraspable, grips, hand_of, turns
 from pytest_simbench.motion.kinematics import top_down_grasps
@@ -17,6 +19,7 @@ from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Pose, Sphere, principal
 from pytest_simbench.scene.bodies import ConvexMesh
+from tests.motion.small_arm import small_arm, still
 
 PANDA = panda()
 UPRIGHT = Pose.at(0.5, 0.1, 0.06, yaw=0.4)
@@ -28,6 +31,11 @@ def prism(*corners: tuple[float, float], height: float = 0.04, taper: float = 1.
     points = [(x * s, y * s, z) for z, s in ((0.0, 1.0), (height, taper)) for x, y in corners]
     vertices, frame = principal(points)
     return ConvexMesh("prism", vertices, frame, mass=0.1)
+
+
+WALLS = [(x, y, z) for x in (0.0, 0.05) for y in (0.0, 0.05) for z in (0.0, 0.02)]
+TENT = ConvexMesh("tent", *principal([*WALLS, (0.025, 0.025, 0.15)]), mass=0.1)
+"""Upright to 2 cm, and so high that the palm keeps the fingers above."""
 
 
 @given(yaw=st.floats(-3.0, 3.0), edge=st.floats(0.024, 0.06))
@@ -97,10 +105,17 @@ def test_what_no_hand_holds_is_refused_in_a_sentence() -> None:
             Sphere("ball", 0.045, UPRIGHT, 0.1),
         "'prism', a convex mesh, has no two sides opposite each other that fingers from above":
             prism((0, 0), (0.05, 0), (0.05, 0.05), (0, 0.05), taper=0.3),
+        "'tent', a convex mesh, has no two sides opposite each other that fingers from above": TENT,
     }  # fmt: skip
     for sentence, body in refused.items():
         with pytest.raises(Ungraspable, match=re.escape(sentence)):
             grips(PANDA, body)
+
+
+def test_a_hand_that_only_touches_holds_nothing(tmp_path: Path) -> None:
+    robot = read_robot(small_arm(tmp_path, still(0.0, 0.0)))
+    with pytest.raises(Ungraspable, match="robot 'small' has no hand with two fingers, nor with o"):
+        grips(robot, Sphere("ball", 0.02, UPRIGHT, 0.1))
 
 
 def test_a_jaw_holds_what_it_was_set_for() -> None:
