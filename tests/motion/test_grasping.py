@@ -121,7 +121,7 @@ def test_the_nearest_positions_alone_leave_cubes_of_the_ur5(
     assert any(problem.startswith("in collision: upper_arm") for problem in problems)
 
 
-def test_from_above_the_hand_can_go_on_as_far_as_is_asked() -> None:
+def test_from_above_the_hand_can_go_down_and_on_as_far_as_is_asked() -> None:
     robot = find("panda")
     model, home = RobotModel(robot), robot.column("initial_position")[:7]
     planning, rng = PlanningScene(model, Scene("free", (), robot)), np.random.default_rng(0)
@@ -131,3 +131,8 @@ def test_from_above_the_hand_can_go_on_as_far_as_is_asked() -> None:
     assert model.tool_pose(aside[-1]).position == pytest.approx((0.5, 0.3, 0.4), abs=1e-5)
     with pytest.raises(PlanningError, match=r"straight line to \(0.5, \d"):
         choose(planning, tools, 0.1, home, home, rng, way=(0.0, 1.3, 0.0))
+    low = top_down_grasps(Pose.at(0.5, 0.0, 0.015))  # tips are nearer to the ground than a margin
+    found = choose(planning, low, 0.1, home, home, rng)
+    assert model.tool_pose(found.above).position == pytest.approx((0.5, 0.0, 0.115), abs=1e-5)
+    with pytest.raises(PlanningError, match=r"^in collision: panda_\w+ and ground$"):
+        choose(planning, low, 0.0, home, home, rng)

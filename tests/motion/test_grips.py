@@ -99,6 +99,16 @@ def test_a_prism_is_grasped_at_its_faces_where_something_stands_opposite() -> No
         assert [grip.width, *grip.tool.position] == pytest.approx([0.03, 0.045, 0.015, 0.02])
 
 
+def test_a_wall_and_a_level_edge_opposite_are_grasped_at_the_edge() -> None:
+    """Where both sides have one height in common."""
+    points = [(x, y, z) for x in (0.0, 0.06) for y, z in ((0.0, 0.0), (0.0, 0.04), (0.05, 0.02))]
+    found = grips(PANDA, ConvexMesh("roof", *principal(points), mass=0.1))
+    across = [grip for grip in found if abs(grip.tool.rotation()[1, 1]) > 0.999]
+    assert [grip.width for grip in across] == pytest.approx([0.05] * 2)
+    for grip in across:
+        assert grip.tool.position == pytest.approx((0.03, 0.025, 0.02))
+
+
 def test_what_no_hand_holds_is_refused_in_a_sentence() -> None:
     refused = {
         "'ball', a sphere, of 9 cm does not fit the fingers of robot 'panda', which hold 0 to 7 cm":
