@@ -26,6 +26,7 @@ from pytest_simbench.motion.swing import (
     LANDING_TOLERANCE,
     LOWEST,
     THROWN,
+    TRIED,
     _adjusted,
     _Candidate,
     _candidates,
@@ -45,7 +46,7 @@ from pytest_simbench.motion.throw import (
 from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Scene, SceneError
 from tests.motion.small_arm import TOML, small_arm
 
-GRAVITY = np.array(STANDARD_GRAVITY)
+GRAVITY, START = np.array(STANDARD_GRAVITY), np.zeros(7)
 
 
 def throw_of(robot: Robot):  # type: ignore[no-untyped-def]
@@ -131,6 +132,31 @@ def test_joints_share_a_velocity_by_their_limits() -> None:
     ways, limits = np.array([[1.0, 0.0, 2.0], [0.0, -1.0, 0.0]]), np.array([1.0, 4.0, 3.0])
     assert _easiest(ways, np.array([-7.0, 2.0]), limits) == pytest.approx([-1.0, -2.0, -3.0])
     assert _easiest(0 * ways, np.array([-7.0, 2.0]), limits).tolist() == [np.inf] * 3
+
+
+def test_the_easiest_swings_are_tried_first_and_so_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the thing in the hand, whose fingers touch it."""
+    tried: list[float] = []
+
+    def adjusted(model: RobotModel, scene: PlanningScene, release: object, *rest: object) -> object:
+        assert (scene.held, scene.opening, scene.scale) == (THROWN.name, 0.025, 0.5)
+        assert rest == (THROWN, GRAVITY, 1.3)
+        tried.append(release.share)  # type: ignore[attr-defined]
+        return "swing" if tried[-1] == 0.3 else None
+
+    def candidates(*given: object) -> list[_Candidate]:
+        assert given[1:] == (GRAVITY, 1.3, 0.5)
+        return [_Candidate(share, START, START) for share in shares]
+
+    monkeypatch.setattr(module, "_adjusted", adjusted)
+    monkeypatch.setattr(module, "_candidates", candidates)
+    shares = [0.5, 0.3, 0.2, 0.9]
+    assert found_swing(panda(), THROWN, GRAVITY, 1.3, 0.5) == "swing"
+    assert tried == [0.2, 0.3]
+    shares = [0.4] * 20
+    with pytest.raises(RobotError, match=r"^robot 'panda' cannot throw to x = 1.3 m: no swing"):
+        found_swing(panda(), THROWN, GRAVITY, 1.3, 0.5)
+    assert len(tried) == 2 + TRIED
 
 
 @pytest.mark.parametrize(
