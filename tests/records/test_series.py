@@ -8,7 +8,15 @@ from itertools import permutations
 import pytest
 
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import by_test, comparable, configurations, series, settled
+from pytest_simbench.records.series import (
+    by_test,
+    comparable,
+    configurations,
+    configured,
+    series,
+    settled,
+    side_by_side,
+)
 
 from .build import failed, record
 
@@ -38,7 +46,8 @@ def test_the_last_attempt_counts_once() -> None:
     assert settled([second, first]) == [second]
     again = record(metrics={"placed": 0.5})
     assert settled([first, again]) == [again]  # written later
-    assert settled([first, replace(second, status="interrupted")]) == [first]
+    cut = replace(second, status="interrupted")
+    assert settled([first, cut]) == settled([cut, first]) == [first]
 
 
 def test_seeds_tasks_modes_and_configurations_are_not_twins() -> None:
@@ -164,6 +173,27 @@ def test_robots_are_told_by_name_alone_and_what_else_differs_beside() -> None:
         "robot=so101 timestep=0.002",
         "robot=so101 timestep=0.001",
     ]
+
+
+def test_what_differs_within_a_run_tells_configurations_apart_in_all() -> None:
+    one, fine = record(1), record(2, settings={"timestep": 0.001})
+    later = [replace(r, versions={"engine": "2.0"}) for r in (one, fine)]
+    alone, other = replace(one, versions={"engine": "3.0"}), record(1, simulator="other")
+    found = configured([one, *later, fine, alone, other], lambda r: str(r.versions))
+    assert found == {
+        (*one.who, "timestep=0.002"): [one, later[0], alone],
+        (*one.who, "timestep=0.001"): [fine, later[1]],
+        other.who: [other],
+    }
+
+
+def test_a_simulator_is_the_baseline_of_others_by_their_tests() -> None:
+    runs = [record(1, test=f"test_{n}[{s}]", simulator=s) for s in "abc" for n in "xy"]
+    before, now = side_by_side(runs[:-1], "a", ["b", "c"])
+    assert [(r.simulator, r.test) for r in before] == [
+        ("b", "test_x[b]"), ("b", "test_y[b]"), ("c", "test_x[c]"), ("c", "test_y[a]"),
+    ]  # fmt: skip
+    assert list(now) == runs[2:-1]
 
 
 def test_rows_are_ranked_only_where_the_same_was_asked() -> None:
