@@ -9,6 +9,7 @@ import pytest
 
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.series import (
+    RowKey,
     by_test,
     comparable,
     configurations,
@@ -108,6 +109,13 @@ def test_a_parameter_that_changes_no_setting_still_tells_rows_apart() -> None:
     """Else each seed would count twice."""
     runs = [record(1, test=f"t.py::test_x[engine-headless-{p}]") for p in "ab"]
     assert [row.label for row in series(runs)] == ["[a]", "[b]"]
+
+
+def test_a_row_is_of_a_robot_a_swept_step_and_a_variant() -> None:
+    plain = record(1, test="t.py::test_x[engine-headless-ur5-fast]", robot={"name": "ur5"})
+    assert RowKey.of(plain) == ("engine", "headless", "tuned", "t.py::test_x", "ur5-fast")
+    swept = plain.noting(own_timestep=0.001)  # at 2 ms
+    assert RowKey.of(swept).parameters == "ur5-dt=2ms-fast"
 
 
 def test_one_row_needs_no_label_and_functions_have_theirs() -> None:
