@@ -148,7 +148,7 @@ def _read_obj(data: bytes) -> FloatArray:
     lines = (line.split() for line in data.decode("utf-8", "replace").splitlines())
     try:
         rows = [[float(x) for x in line[1:4]] for line in lines if line and line[0] == "v"]
-        return np.array(rows).reshape(-1, 3)
+        return np.array(rows, dtype=float).reshape(-1, 3)
     except ValueError:
         return np.empty((0, 3))
 
