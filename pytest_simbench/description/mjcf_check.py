@@ -94,8 +94,8 @@ def _included(
     found: dict[ET.Element, int] = {}
     often = {xml: times}
     for element in xml.iter():
-        count = element.get("count", "") if element.tag == "replicate" else ""
-        inside = often[element] * (int(count[:9]) if count.isdecimal() else 1)
+        count = element.get("count") if element.tag == "replicate" else None
+        inside = often[element] * (int(count[:9]) if count and count.isdecimal() else 1)
         often.update(dict.fromkeys(element, inside))
         if element.tag != "include":
             found[element] = often[element]

@@ -54,7 +54,7 @@ def level_turns(body: Pose) -> list[float]:
 
 def tool_over(place: Pose, yaw: float) -> Pose:
     """Downward tool pose at a place's position, turned by `yaw` about the vertical [rad]."""
-    return Pose(place.position, (Pose.at(0, 0, 0, yaw=yaw) * DOWNWARD).quaternion)
+    return Pose.at(*place.position, yaw=yaw) * DOWNWARD
 
 
 def inverse_kinematics(

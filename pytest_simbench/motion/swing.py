@@ -113,11 +113,11 @@ def _candidates(
         joints = ready.copy()
         joints[moving] = drawn
         tool = model.tool_transform(joints)
-        away = np.array([landing, 0.0, 0.0]) - tool.translation
-        distance, height = float(np.hypot(*away[:2])), float(tool.translation[2])
+        away = np.array([landing, 0.0]) - tool.translation[:2]
+        distance, height = float(np.hypot(*away)), float(tool.translation[2])
         if height < LOWEST * scale or away[0] <= 0:
             continue
-        plane = np.array([[*(away[:2] / distance), 0.0], [0.0, 0.0, 1.0]])
+        plane = np.array([[*(away / distance), 0.0], [0.0, 0.0, 1.0]])
         turned = plane @ tool.rotation @ model.tool_jacobian(joints)[:3, moving]
         for elevation in ELEVATIONS:
             speed = _speed(distance, height - LANDING_HEIGHT * scale, elevation, gravity)

@@ -42,7 +42,7 @@ class UnknownMetric(LookupError):
     def __init__(self, name: str, valid: Iterable[str], where: str = "") -> None:
         self.name = name
         self.valid = sorted(valid)
-        near = get_close_matches(name, self.valid, n=1)
+        near = get_close_matches(name, self.valid)
         hint = f"did you mean {near[0]!r}? " if near else ""
         super().__init__(
             f"no metric is named {name!r}{where}; {hint}valid names: {', '.join(self.valid)}"

@@ -38,9 +38,7 @@ def upgraded(data: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def taken_apart(
-    test: str, simulator: str, mode: str, profile: str = "", robot: str = ""
-) -> tuple[str, str]:
+def taken_apart(test: str, simulator: str, mode: str, profile: str, robot: str) -> tuple[str, str]:
     """Function and variant of a test's id."""
     function, _, parameters = test.partition("[")
     inside = "-" + parameters.removesuffix("]") + "-"

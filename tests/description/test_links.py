@@ -19,6 +19,7 @@ from pytest_simbench.description.links import (
     link_poses,
     links_collide,
     motion_subspace,
+    opening,
     reduced,
 )
 from pytest_simbench.laws.base import Law
@@ -118,6 +119,20 @@ def test_frames_of_a_closure_are_one_frame_where_the_joints_start() -> None:
     poses = link_poses(PREPARED)
     turns = [(poses[f"panda_link{k}"] * at).rotation() for k, at in ((2, first), (5, second))]
     np.testing.assert_allclose(*turns, atol=1e-12)
+
+
+def test_the_widest_gap_of_all_loops_is_told() -> None:
+    """Of both fingers, held where they start, one is moved by 10 mm and one by 20."""
+    poses, start = link_poses(PREPARED), ROBOT.column("initial_position")
+    loops = tuple(
+        Closure("panda_link0", name, (ROBOT.base.inverse() * poses[name]).position)
+        for name in ("panda_leftfinger", "panda_rightfinger")
+    )
+    prepared, moved = PreparedRobot(replace(ROBOT, closures=loops)), start.copy()
+    assert opening(prepared, start) < 1e-9
+    moved[-2:] += 0.01, -0.02
+    assert opening(prepared, moved) == pytest.approx(0.02)
+    assert opening(PREPARED, moved) == 0.0
 
 
 def test_what_is_no_srdf_is_told(tmp_path: Path) -> None:

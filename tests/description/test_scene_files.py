@@ -68,6 +68,7 @@ REFUSED = {
     "line 1: the scene has a document type": '<!DOCTYPE m [<!ENTITY a "b">]><mujoco>&a;</mujoco>',
     "line 2: <include> of a.xml runs in a circle": '<mujoco>\n<include file="a.xml"/></mujoco>',
     "line 1: the file 'b.xml' is not there": '<mujoco><include file="b.xml"/></mujoco>',
+    "line 1: the file 'm{199} is no path$": f'<mujoco><mesh file="{300 * "m"}"/></mujoco>',
     "line 2: the file 'm.stl' is not there": '<mujoco>\n<mesh file="m.stl"/></mujoco>',
     "line 1: the file '../../../m.stl' lies out": '<mujoco><mesh file="../../../m.stl"/></mujoco>',
     "the file '/etc/passwd' lies out": '<mujoco><include file="/etc/passwd"/></mujoco>',
@@ -131,6 +132,18 @@ def test_a_file_that_is_attached_is_looked_at_too(tmp_path: Path) -> None:
     (tmp_path / "b.xml").write_text('<mujoco><model file="a.xml"/><mesh file="/m.stl"/></mujoco>')
     with pytest.raises(DescriptionError, match="b.xml, line 1: the file '/m.stl' lies out"):
         check_mjcf(str(tmp_path / "a.xml"))
+
+
+def test_what_is_attached_deep_below_may_name_all_that_the_scene_may(tmp_path: Path) -> None:
+    deep = tmp_path / "scenes" / "one" / "parts" / "two" / "three" / "b.xml"
+    deep.parent.mkdir(parents=True)
+    (tmp_path / "m.stl").write_text("")
+    deep.write_text('<mujoco><mesh file="../../../../../m.stl"/></mujoco>')
+    scene = tmp_path / "scenes" / "one" / "a.xml"
+    scene.write_text('<mujoco><model file="parts/two/three/b.xml"/></mujoco>')
+    check_mjcf(str(scene))
+    with pytest.raises(DescriptionError, match="lies out of the folder"):
+        check_mjcf(str(deep))
 
 
 def test_files_beside_are_read_but_a_whole_home_is_no_room(
@@ -217,10 +230,14 @@ def test_starts_differ_from_what_they_leave_and_in_what_drives_are_told(tmp_path
     [
         ({"c": rows((0, 0, 0))}, "'c', which is no free body of scene 's'; it has a, b"),
         ({"a": np.zeros((2, 3))}, r"must hold an array \(n, 7\)"),
+        ({"a": np.zeros(7)}, r"must hold an array \(n, 7\)"),
+        ({"a": rows((0, 0, 0)), "b": np.zeros((1, 7, 7))}, r"must hold an array \(n, 7\)"),
+        ({"a": np.array([["x"] * 7])}, "the starts of 'a' are not all finite numbers"),
         ({"a": np.zeros((0, 7))}, "of the same n, 1 or more"),
         ({"a": rows((0, 0, 0)), "b": rows((0, 0, 0), (1, 0, 0))}, "of the same n"),
         ({"a": rows((0, 0, np.nan))}, "not all finite"),
         ({"a": np.zeros((1, 7))}, "quaternion of 'a' in row 0 has no unit length"),
+        ({"a": [*rows((0, 0, 0)), np.ones(7)]}, "quaternion of 'a' in row 1 has no unit length"),
         ({}, r"must hold an array \(n, 7\)"),
     ],
 )

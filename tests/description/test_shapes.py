@@ -10,7 +10,9 @@ import pytest
 from pytest_simbench.description.mesh_check import written_stl
 from pytest_simbench.description.shapes import (
     DIRECTIONS,
+    a_box,
     a_cylinder,
+    a_mesh,
     a_round,
     box_corners,
     capsule_hull,
@@ -78,6 +80,15 @@ def test_reach_of_what_is_round() -> None:
     np.testing.assert_allclose(reached, reach(rims), atol=1e-6)
     ends = placed(np.array([[0, 0, 0.4], [0, 0, -0.4]]), pose)
     np.testing.assert_allclose(a_round(0.3, 0.8, pose)[1], reach(ends) + 0.3)
+
+
+def test_reach_of_what_has_corners() -> None:
+    pose = Pose((0.1, -0.2, 0.3), (0.5, 0.5, -0.1, 0.7))
+    corners = box_corners((0.2, 0.4, 0.6))
+    told = dict([a_box((0.2, 0.4, 0.6), pose), a_mesh(corners, pose)])
+    assert list(told) == ["boxes", "meshes"]
+    for reached in told.values():
+        np.testing.assert_allclose(reached, reach(corners @ pose.rotation().T + pose.position))
 
 
 @pytest.mark.parametrize("half", [0.0, 0.5])

@@ -14,7 +14,7 @@ import pytest
 
 from pytest_simbench.description.robot_files import folder, received, with_content
 from pytest_simbench.description.shapes import reach, shape_points
-from pytest_simbench.description.urdf import body_urdf, write_origin
+from pytest_simbench.description.urdf import body_urdf, write_link, write_origin
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
 from pytest_simbench.scene import Compound, ConvexMesh, Cylinder, Pose, Scene, principal
@@ -71,6 +71,8 @@ def test_other_fingers_follow_and_nothing_is_drawn_where_asked() -> None:
     told = {"joint": "panda_finger_joint1", "multiplier": "1", "offset": "0"}
     assert followers == {"panda_finger_joint2": told}
     assert [len([*root.iter(tag)]) for tag in ("visual", "collision")] == [0, 17]
+    write_link(drawn := ET.Element("robot"), PreparedRobot(panda()).links["base"])
+    assert [len([*drawn.iter(tag)]) for tag in ("visual", "collision")] == [1, 1]
 
 
 def test_a_body_is_one_link(tmp_path: Path) -> None:

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from pytest_simbench.description.mesh_check import read_stl
+from pytest_simbench.description.robot_files import folder
 from pytest_simbench.description.shapes import write_stl
 from pytest_simbench.description.urdf import PreparedRobot
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.handle import SimulatorHandle
 from pytest_simbench.experiment.scene_file import SceneFile, read_scene_file
-from pytest_simbench.scene import Coupling, Polytope
+from pytest_simbench.scene import Coupling, Gripper, Polytope, Pose
 from pytest_simbench.scene.robot import FASTEST, FREE, WIDEST
 from pytest_simbench.simulator import DescriptionError
 from tests.approval import assert_approved
@@ -75,6 +76,7 @@ def test_joints_have_no_drives_and_the_dynamics_of_the_file(tmp_path: Path) -> N
     }  # fmt: skip
     assert prepared.velocity_limits == {"rail": FASTEST, "hinge": FASTEST}
     assert [len(link.shapes) for link in prepared.moving_links] == [1, 2]  # with its handle
+    assert scene.robot.gripper == Gripper((), 0.0, 0.0, 0.0)
     assert (scene.name, scene.file) == ("cabinet", str(tmp_path / "cabinet.urdf"))
 
 
@@ -82,7 +84,18 @@ def test_it_is_moved_up_onto_the_ground(tmp_path: Path) -> None:
     assert read(tmp_path).scene.file_lift == pytest.approx(0.3)
     higher = read(tmp_path, ('xyz="-.3 0 0"', 'xyz="-.3 0 .7"')).scene
     assert higher.file_lift == pytest.approx(0.1)  # of the drawer
-    assert higher.robot.base.position[2] == pytest.approx(0.1)
+    assert higher.robot.base == Pose.at(0.0, 0.0, higher.file_lift)
+
+
+def test_its_meshes_are_kept_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder.cache_clear()
+    try:
+        robot = read(tmp_path).scene.robot
+        meshes = [link.shapes[0].mesh for link in PreparedRobot(robot).moving_links]
+        assert {Path(file).parent for file in (*meshes, robot.urdf)} == {folder()}
+    finally:
+        folder.cache_clear()
 
 
 def test_round_shapes_are_hulls_that_touch_them_from_inside(tmp_path: Path) -> None:

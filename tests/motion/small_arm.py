@@ -65,6 +65,12 @@ tool_frame = "grip"
 """
 
 
+def still(left: float, right: float) -> str:
+    """A hand that only touches, its fingers locked."""
+    arm = TOML[: TOML.index("[hand]")] + '[hand]\ntool_frame = "grip"\n'
+    return f"{arm}\n[locked]\nleft_finger = {left}\nright_finger = {right}\n"
+
+
 def small_arm(folder: Path, toml: str = TOML, urdf: str = URDF) -> Path:
     """Write both files; the path of the TOML file."""
     (folder / "small.urdf").write_text(urdf, encoding="utf-8")

@@ -11,26 +11,23 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from pytest_simbench.description.robot_files import folder
 from pytest_simbench.description.urdf import pose_of_rpy
 from pytest_simbench.experiment.case import Case
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.experiment.repetition import Repetition
-from pytest_simbench.motion.adapting import bound_joints
+from pytest_simbench.motion.adapting import bound_joints, with_tool
 from pytest_simbench.motion.errors import RobotError
 from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.model import RobotModel
+from pytest_simbench.motion.registry import ARMS
 from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import PreparedRobot
 from pytest_simbench.tasks import Pushing
 from tests.conftest import measured
-from tests.motion.small_arm import TOML, URDF, small_arm
+from tests.motion.small_arm import TOML, URDF, small_arm, still
 
-TOUCHING = TOML[: TOML.index("[hand]")] + '[hand]\ntool_frame = "grip"\n'
 MICO = Path(__file__).parents[2] / "docs" / "extending" / "mico2.toml"
-
-
-def still(left: float, right: float) -> str:
-    return f"{TOUCHING}\n[locked]\nleft_finger = {left}\nright_finger = {right}\n"
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=8)
@@ -145,6 +142,25 @@ def test_the_tool_centre_point_may_lie_beside_a_link(tmp_path: Path) -> None:
         turned = (expected.inverse() * found).quaternion
         assert abs(turned[0]) == pytest.approx(1.0, abs=1e-12)
     assert PreparedRobot(moved).links.keys() == PreparedRobot(plain.robot).links.keys()
+
+
+def test_what_is_read_lies_in_the_folder_of_this_machine_with_its_meshes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A hand mounted on an arm, hulls, and a tool beside a link, where nothing was kept before."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    folder.cache_clear()
+    try:
+        for name in ("ur5", "so101"):
+            robot = read_robot(ARMS / f"{name}.toml")
+            for each in (robot, with_tool(robot, Pose(), "tip", "to_tip")):
+                links = PreparedRobot(each).links.values()
+                meshes = [shape.mesh for link in links for shape in link.shapes if shape.mesh]
+                assert len(meshes) >= 8
+                assert {Path(file).parent for file in (*meshes, each.urdf)} == {folder()}
+                assert folder().is_relative_to(tmp_path)
+    finally:
+        folder.cache_clear()
 
 
 def test_an_arm_from_outside_pushes_from_a_file_alone(case: Case, tmp_path: Path) -> None:

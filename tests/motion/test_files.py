@@ -21,7 +21,7 @@ from pytest_simbench.scene import Pose
 from pytest_simbench.simulator import PreparedRobot
 from tests.motion.small_arm import TOML, URDF, joint, link, small_arm
 
-MOUNTED = ("ur5", "ur10", "xarm7")
+MOUNTED, HAND = ("ur5", "ur10", "xarm7"), ("left_finger", "right_finger")
 
 
 def test_a_file_says_everything(tmp_path: Path) -> None:
@@ -173,6 +173,12 @@ def test_a_hand_of_three_fingers_and_one_of_one(tmp_path: Path) -> None:
     )
     toml = TOML.replace(', "right_finger"]', "]")
     assert read_robot(small_arm(tmp_path, toml, jaw)).gripper.couplings == ()
+
+
+def test_fingers_may_follow_each_other(tmp_path: Path) -> None:
+    end = 'child link="right"/>'
+    urdf = URDF.replace(end, f'{end}<mimic joint="left_finger"/>')
+    assert read_robot(small_arm(tmp_path, TOML, urdf)).joint_names[3:] == HAND
 
 
 Change = Callable[[str], str]

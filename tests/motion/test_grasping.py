@@ -14,10 +14,10 @@ from pytest_simbench.motion import grasping as grasps
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.grasping import CLEARANCE, GRASP_LINK, choose, grasp_of, grasping
-from pytest_simbench.motion.kinematics import top_down_grasps
+from pytest_simbench.motion.kinematics import straight_line, top_down_grasps
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import find
-from pytest_simbench.scene import FloatArray, Scene
+from pytest_simbench.scene import FloatArray, Pose, Scene
 from pytest_simbench.tasks import Stacking
 from pytest_simbench.tasks.base import Jitter
 
@@ -119,3 +119,20 @@ def test_the_nearest_positions_alone_leave_cubes_of_the_ur5(
     monkeypatch.setattr(grasps, "FURTHER_RESTARTS", 0)
     problems = choices("ur5")
     assert any(problem.startswith("in collision: upper_arm") for problem in problems)
+
+
+def test_from_above_the_hand_can_go_down_and_on_as_far_as_is_asked() -> None:
+    robot = find("panda")
+    model, home = RobotModel(robot), robot.column("initial_position")[:7]
+    planning, rng = PlanningScene(model, Scene("free", (), robot)), np.random.default_rng(0)
+    tools = top_down_grasps(Pose.at(0.5, 0.0, 0.3))
+    found = choose(planning, tools, 0.1, home, home, rng, way=(0.0, 0.3, 0.0))
+    aside = straight_line(model, found.above, found.tool.translated(y=0.3, z=0.1))
+    assert model.tool_pose(aside[-1]).position == pytest.approx((0.5, 0.3, 0.4), abs=1e-5)
+    with pytest.raises(PlanningError, match=r"straight line to \(0.5, \d"):
+        choose(planning, tools, 0.1, home, home, rng, way=(0.0, 1.3, 0.0))
+    low = top_down_grasps(Pose.at(0.5, 0.0, 0.015))  # tips are nearer to the ground than a margin
+    found = choose(planning, low, 0.1, home, home, rng)
+    assert model.tool_pose(found.above).position == pytest.approx((0.5, 0.0, 0.115), abs=1e-5)
+    with pytest.raises(PlanningError, match=r"^in collision: panda_\w+ and ground$"):
+        choose(planning, low, 0.0, home, home, rng)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.grasping import grasping
 from pytest_simbench.motion.grips import SLACK, Ungraspable, grips, hand_of, turns
 from pytest_simbench.motion.kinematics import top_down_grasps
@@ -17,6 +19,7 @@ from pytest_simbench.motion.panda import panda
 from pytest_simbench.motion.registry import find
 from pytest_simbench.scene import Body, Box, Capsule, Cylinder, Pose, Sphere, principal
 from pytest_simbench.scene.bodies import ConvexMesh
+from tests.motion.small_arm import small_arm, still
 
 PANDA = panda()
 UPRIGHT = Pose.at(0.5, 0.1, 0.06, yaw=0.4)
@@ -28,6 +31,11 @@ def prism(*corners: tuple[float, float], height: float = 0.04, taper: float = 1.
     points = [(x * s, y * s, z) for z, s in ((0.0, 1.0), (height, taper)) for x, y in corners]
     vertices, frame = principal(points)
     return ConvexMesh("prism", vertices, frame, mass=0.1)
+
+
+WALLS = [(x, y, z) for x in (0.0, 0.05) for y in (0.0, 0.05) for z in (0.0, 0.02)]
+TENT = ConvexMesh("tent", *principal([*WALLS, (0.025, 0.025, 0.15)]), mass=0.1)
+"""Upright to 2 cm, and so high that the palm keeps the fingers above."""
 
 
 @given(yaw=st.floats(-3.0, 3.0), edge=st.floats(0.024, 0.06))
@@ -91,16 +99,33 @@ def test_a_prism_is_grasped_at_its_faces_where_something_stands_opposite() -> No
         assert [grip.width, *grip.tool.position] == pytest.approx([0.03, 0.045, 0.015, 0.02])
 
 
+def test_a_wall_and_a_level_edge_opposite_are_grasped_at_the_edge() -> None:
+    """Where both sides have one height in common."""
+    points = [(x, y, z) for x in (0.0, 0.06) for y, z in ((0.0, 0.0), (0.0, 0.04), (0.05, 0.02))]
+    found = grips(PANDA, ConvexMesh("roof", *principal(points), mass=0.1))
+    across = [grip for grip in found if abs(grip.tool.rotation()[1, 1]) > 0.999]
+    assert [grip.width for grip in across] == pytest.approx([0.05] * 2)
+    for grip in across:
+        assert grip.tool.position == pytest.approx((0.03, 0.025, 0.02))
+
+
 def test_what_no_hand_holds_is_refused_in_a_sentence() -> None:
     refused = {
         "'ball', a sphere, of 9 cm does not fit the fingers of robot 'panda', which hold 0 to 7 cm":
             Sphere("ball", 0.045, UPRIGHT, 0.1),
         "'prism', a convex mesh, has no two sides opposite each other that fingers from above":
             prism((0, 0), (0.05, 0), (0.05, 0.05), (0, 0.05), taper=0.3),
+        "'tent', a convex mesh, has no two sides opposite each other that fingers from above": TENT,
     }  # fmt: skip
     for sentence, body in refused.items():
         with pytest.raises(Ungraspable, match=re.escape(sentence)):
             grips(PANDA, body)
+
+
+def test_a_hand_that_only_touches_holds_nothing(tmp_path: Path) -> None:
+    robot = read_robot(small_arm(tmp_path, still(0.0, 0.0)))
+    with pytest.raises(Ungraspable, match="robot 'small' has no hand with two fingers, nor with o"):
+        grips(robot, Sphere("ball", 0.02, UPRIGHT, 0.1))
 
 
 def test_a_jaw_holds_what_it_was_set_for() -> None:

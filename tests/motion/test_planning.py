@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pytest_simbench.motion import planning
 from pytest_simbench.motion.collision import PlanningScene
 from pytest_simbench.motion.errors import PlanningError
 from pytest_simbench.motion.kinematics import DECIMALS, inverse_kinematics, tool_over
@@ -56,6 +57,12 @@ def test_a_wall_is_passed_without_touching() -> None:
     assert free
     straight = np.linspace(arm[0], arm[-1], len(arm))
     assert np.abs(arm - straight).max() > 0.1
+
+
+def test_a_search_gives_up_after_so_many_checks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planning, "MAX_CHECKS", 5)
+    with pytest.raises(PlanningError, match=r"^no path found in 6 checks$"):
+        around_the_wall(3)
 
 
 def test_same_seed_same_plan() -> None:

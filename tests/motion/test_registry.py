@@ -28,12 +28,16 @@ def breaks():
 
 def nothing():
     return None
+
+def stops():
+    raise KeyboardInterrupt
 """
 ENTRIES = """[pytest_simbench.robots]
 mine = my_robots:mine
 other = my_robots:mine
 breaks = my_robots:breaks
 nothing = my_robots:nothing
+stops = my_robots:stops
 absent = my_robots:absent
 """
 
@@ -58,6 +62,8 @@ def test_a_package_registers_a_robot() -> None:
     assert registry.known()[:5] == ["panda", "so101", "ur10", "ur5", "xarm7"]
     assert "mine" in registry.known()
     assert registry.find("mine").name == "mine"
+    with pytest.raises(KeyboardInterrupt):
+        registry.find("stops")
 
 
 @pytest.mark.usefixtures("package")

@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pytest_simbench.cli.main import main
+from pytest_simbench.motion import swing as module
 from pytest_simbench.motion.collision import PlanningScene
-from pytest_simbench.motion.errors import RobotError
+from pytest_simbench.motion.errors import PlanningError, RobotError
 from pytest_simbench.motion.files import read_robot
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.panda import panda
@@ -24,6 +26,9 @@ from pytest_simbench.motion.swing import (
     LANDING_TOLERANCE,
     LOWEST,
     THROWN,
+    TRIED,
+    _adjusted,
+    _Candidate,
     _candidates,
     _easiest,
     _in_plane,
@@ -38,10 +43,10 @@ from pytest_simbench.motion.throw import (
     released,
     swing_of,
 )
-from pytest_simbench.scene import STANDARD_GRAVITY, Pose, Robot, Scene, SceneError
+from pytest_simbench.scene import STANDARD_GRAVITY, FloatArray, Pose, Robot, Scene, SceneError
 from tests.motion.small_arm import TOML, small_arm
 
-GRAVITY = np.array(STANDARD_GRAVITY)
+GRAVITY, START = np.array(STANDARD_GRAVITY), np.zeros(7)
 
 
 def throw_of(robot: Robot):  # type: ignore[no-untyped-def]
@@ -127,6 +132,70 @@ def test_joints_share_a_velocity_by_their_limits() -> None:
     ways, limits = np.array([[1.0, 0.0, 2.0], [0.0, -1.0, 0.0]]), np.array([1.0, 4.0, 3.0])
     assert _easiest(ways, np.array([-7.0, 2.0]), limits) == pytest.approx([-1.0, -2.0, -3.0])
     assert _easiest(0 * ways, np.array([-7.0, 2.0]), limits).tolist() == [np.inf] * 3
+
+
+def test_the_easiest_swings_are_tried_first_and_so_many(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the thing in the hand, whose fingers touch it."""
+    tried: list[float] = []
+
+    def adjusted(model: RobotModel, scene: PlanningScene, release: object, *rest: object) -> object:
+        assert (scene.held, scene.opening, scene.scale) == (THROWN.name, 0.025, 0.5)
+        assert rest == (THROWN, GRAVITY, 1.3)
+        tried.append(release.share)  # type: ignore[attr-defined]
+        return "swing" if tried[-1] == 0.3 else None
+
+    def candidates(*given: object) -> list[_Candidate]:
+        assert given[1:] == (GRAVITY, 1.3, 0.5)
+        return [_Candidate(share, START, START) for share in shares]
+
+    monkeypatch.setattr(module, "_adjusted", adjusted)
+    monkeypatch.setattr(module, "_candidates", candidates)
+    shares = [0.5, 0.3, 0.2, 0.9]
+    assert found_swing(panda(), THROWN, GRAVITY, 1.3, 0.5) == "swing"
+    assert tried == [0.2, 0.3]
+    shares = [0.4] * 20
+    with pytest.raises(RobotError, match=r"^robot 'panda' cannot throw to x = 1.3 m: no swing"):
+        found_swing(panda(), THROWN, GRAVITY, 1.3, 0.5)
+    assert len(tried) == 2 + TRIED
+
+
+@pytest.mark.parametrize(
+    ("wanted", "below", "found"),
+    [(0.3, 1.5, True), (0.45, 1.5, True), (0.52, 1.5, False), (0.05, 1.5, False),
+     (0.15, 0.1, True), (0.3, 0.1, False), (0.3, 0.01, False), (0.08, 0.05, False)],
+)  # fmt: skip
+def test_a_swing_is_as_long_as_its_throw_must_be(
+    wanted: float, below: float, found: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a throw that goes as far as its swing is long: through the release, from a fifth of a
+    first guess on, no longer than what is free (0.5 s) nor beyond limits that stand `below`."""
+    model = RobotModel(panda())
+    joints, velocity = model.home, np.eye(7)[1]
+    joints[1] = model.upper[1] - below
+
+    def planned(arm: object, start: FloatArray, end: FloatArray, *rest: object) -> object:
+        assert (arm, *rest) == (model, GRAVITY, THROWN)
+        if start[1] > 1.65:
+            raise PlanningError("too weak")
+        return (start, end), 2.0
+
+    def thrown(arm: object, ends: tuple[FloatArray, FloatArray], *rest: object) -> object:
+        assert (arm, *rest) == (model, 2.0, 0.5, 0.5)
+        way = ends[1][1] - ends[0][1]
+        return SimpleNamespace(landing=lambda g: way if g is GRAVITY and way > 0.1 else None)
+
+    def touched(path: FloatArray, ignored: tuple[str, ...]) -> object:
+        assert (len(path), ignored) == (60, (THROWN.name,))
+        return None if path[-1][1] - path[0][1] < 0.5 else ("hand", "ground")
+
+    monkeypatch.setattr(module, "feasible_swing", planned)
+    monkeypatch.setattr(module, "released", thrown)
+    planning = SimpleNamespace(scale=0.5, first_collision=touched)
+    swing = _adjusted(model, planning, _Candidate(0.5, joints, velocity), THROWN, GRAVITY, wanted)  # type: ignore[arg-type]
+    assert (swing is not None) is found
+    if swing is not None:
+        assert sum(swing) / 2 == pytest.approx(joints)
+        assert swing[1] - swing[0] == pytest.approx(wanted * velocity, abs=LANDING_TOLERANCE / 2)
 
 
 @given(st.floats(0.2, 3.0), st.floats(0.1, 1.5), st.floats(0.0, 1.0))

@@ -149,6 +149,8 @@ def test_another_robot_is_named() -> None:
         'robot.digest was absent, is "12ab" (t)',
     ]
     assert differences({"t": runs["t"][::-1]})[0] == 'robot.name was "ur5", is absent (t)'
+    assert differences(runs, fields=["robot"]) == differences(runs)
+    assert differences(runs, fields=["settings"]) == []
     runs = {"t": ([whole(robot={**ur5, "digest": "34cd"})], [whole(robot=ur5)])}
     assert differences(runs) == ['robot.digest was "34cd", is "12ab" (t)']
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.records.claims import Claim
 from pytest_simbench.records.description import TaskDescription, Threshold
 from pytest_simbench.records.folder import RECORDS, TASKS, THRESHOLDS, RunFolder
 from pytest_simbench.records.lines import LARGEST_LINE
@@ -105,6 +106,7 @@ def test_a_record_too_long_to_be_read_keeps_all_but_its_details(tmp_path: Path) 
     noted = record(1, details=details, metrics={"placed": 0.5}).noting(log="logs/a.log")
     RunFolder(path.parent).append(noted)
     (found,) = RunFolder.of(path).read().records
+    assert json.loads(path.read_text())["details"] == {}
     assert found.metrics == {"placed": 0.5}
     assert found.notes.log == "logs/a.log"
     size = len(noted.to_json())
@@ -175,6 +177,19 @@ def test_thresholds_are_read_back_each_once(tmp_path: Path) -> None:
         folder.ask(threshold)
     assert RunFolder(tmp_path).read().thresholds == tuple(asked)
     assert len((tmp_path / THRESHOLDS).read_text().splitlines()) == 2
+
+
+def test_what_came_of_claims_is_read_back_in_its_order(tmp_path: Path) -> None:
+    """All of them, also what was judged anew; another reader has them from the disk."""
+    folder = folder_with(tmp_path)
+    assert not folder.used
+    first = Claim("t[a]", "t", "a", "headless", "tuned", "FAIL", metric="caught", threshold=0.9)
+    again = replace(first, verdict="PASS", relation="at least", mean=0.95, n=20)
+    for claim in (first, again):
+        folder.claim(claim)
+    assert folder.scan().claims[-2:] == RunFolder(tmp_path).read().claims == (first, again)
+    folder.ask(Threshold("t", "caught", 0.9))
+    assert folder.used
 
 
 @pytest.mark.parametrize(

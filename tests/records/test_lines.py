@@ -71,6 +71,16 @@ def test_records_that_no_disk_takes_are_handed_back(tmp_path: Path) -> None:
     )
 
 
+def test_what_cannot_be_read_is_named_with_its_reason(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for name, why in (("pipe", "it is no ordinary file"), ("none", "No such file or directory")):
+        with pytest.raises(lines.UnreadableError) as told:
+            lines.read(tmp_path, name, lambda data, where: data)
+        assert (str(told.value), told.value.reason) == (
+            f"{tmp_path / name} cannot be read ({why})", why,
+        )  # fmt: skip
+
+
 def test_the_system_folder_is_the_fallback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     file = LinesFile(Path("/dev"), "full")

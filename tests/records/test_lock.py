@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -60,6 +62,30 @@ def test_a_folder_made_for_nothing_goes_away(tmp_path: Path) -> None:
     (tmp_path / "old").mkdir()
     FolderLock(tmp_path / "old").close()
     assert (tmp_path / "old").exists()
+    lock = FolderLock(tmp_path / "used" / "run")
+    (tmp_path / "used" / "run" / "records.jsonl").touch()
+    lock.close()
+    assert (tmp_path / "used" / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("number", "why"),
+    [(errno.EIO, "cannot be locked (Input/output error)"), (errno.ENOLCK, ""),
+     (errno.ENOTSUP, ""), (errno.EBADF, ""), (errno.EINVAL, "")],
+)  # fmt: skip
+def test_a_file_system_without_locks_gives_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, why: str
+) -> None:
+    def flock(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("fcntl.flock", flock)
+    if why:
+        with pytest.raises(FolderError, match=re.escape(f"the run folder {tmp_path / 'a'} {why}")):
+            FolderLock(tmp_path / "a")
+        assert not (tmp_path / "a").exists()
+    else:
+        FolderLock(tmp_path / "a").close()
 
 
 @pytest.mark.parametrize("kind", ["file", "through", "link", "loop", "refused", "long"])

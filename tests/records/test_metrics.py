@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -42,6 +45,35 @@ def test_a_crash_counts_with_the_worst_there_is() -> None:
     for better, worst in (("higher", 0.0), ("lower", 1.0), (None, None)):
         assert Metric("x", "x", better=better, kind="yes_no").crashed == worst
         assert Metric("x", "x", better=better).crashed is None
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"kind": "part"}, "metric 'x': kind='part'; choose from 'share', 'yes_no', 'value'"),
+        ({"better": "more"}, "metric 'x': better='more'; choose from 'higher', 'lower', None"),
+        ({"kind": "share"}, "metric 'x' is a share: say of how many things (of=...)"),
+    ],
+)
+def test_what_is_no_metric_is_told(given: dict[str, Any], told: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(told)):
+        Metric("x", "x", **given)
+
+
+def test_what_a_metric_can_be_and_by_how_much_it_differs() -> None:
+    share, hit, count = (
+        Metric("a", "a", kind="share", of=3),
+        Metric("b", "b", kind="yes_no"),
+        COSTS[0],
+    )
+    assert [share.holds(value) for value in (-0.1, 0.0, 0.5, 1.0, 1.1)] == [False] + [True] * 3 + [
+        False
+    ]
+    assert [count.holds(value) for value in (-0.1, 0.0)] == [False, True]
+    assert Metric("x", "x").holds(-9.0)
+    free = [Metric("x", "x", unit) for unit in ("m/s", "m/s^2")]
+    assert [m.smallest_difference for m in (share, hit, *free)] == [0.0, 0.0, 0.005, 0.0]
+    assert Metric("x", "x", "m", resolution=0.2).smallest_difference == 0.2
 
 
 def test_an_unknown_name_lists_the_valid_ones_and_the_nearest() -> None:

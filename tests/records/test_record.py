@@ -68,11 +68,26 @@ def test_keys_of_a_newer_plugin_are_kept() -> None:
 def test_numpy_values_nan_and_infinity_become_json() -> None:
     found = record(
         metrics={"placed": np.float64(0.5), "hit": np.bool_(True), "x": float("nan")},  # type: ignore[dict-item]
-        details={"path": Path("a/b"), "poses": np.eye(2), "seed": np.int64(3), "far": float("inf")},
+        details={
+            "path": Path("a/b"),
+            "poses": np.eye(2),
+            "seed": np.int64(3),
+            "far": float("inf"),
+            "names": {"b", "a"},
+        },
     )
     data = json.loads(found.to_json())
     assert data["metrics"] == {"placed": 0.5, "hit": True, "x": None}
-    assert data["details"] == {"path": "a/b", "poses": [[1, 0], [0, 1]], "seed": 3, "far": None}
+    assert data["details"] == {"path": "a/b", "poses": [[1, 0], [0, 1]], "seed": 3, "far": None,
+                               "names": ["a", "b"]}  # fmt: skip
+
+
+def test_times_that_were_none_are_not_there_and_what_is_empty_is_not_written() -> None:
+    found = record(seconds={"step": float("nan"), "total": 9.5}, timeline={"start": float("inf")})
+    read = Record.from_json(found.to_json())
+    assert (read.seconds, read.timeline) == ({"total": 9.5}, {})
+    told = record(robot={"name": "ur5"}, task_code="1f").to_dict()
+    assert told.keys() - record().to_dict().keys() == {"robot", "task_code"}
 
 
 def test_costs_are_read_from_the_record() -> None:

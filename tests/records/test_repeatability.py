@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pytest_simbench.records.lines import Found
-from pytest_simbench.records.repeatability import NAME, Again, Line, append, read
+from pytest_simbench.records.repeatability import NAME, Again, Line, StateDifference, append, read
 
 LINE = Line(
     "search",
@@ -29,6 +29,15 @@ AGAIN = Again(
     way="reset", first=1.0, body="a", growth={"1": 0.1, "5": None}, largest=0.2, changed=["moved"]
 ).to_wire()
 REPLAY = replace(LINE, kind="replay", result={"claims": True, "again": [AGAIN]})
+
+
+@pytest.mark.parametrize("part", ["first", "body", "growth", "largest"])
+def test_two_runs_part_whole_or_not_at_all(part: str) -> None:
+    whole = {"first": 1.0, "body": "a", "growth": {}, "largest": 0.2}
+    assert StateDifference(**whole) != StateDifference()  # type: ignore[arg-type]
+    for told in (whole | {part: None}, {part: whole[part]}):
+        with pytest.raises(ValueError, match="it parted in part"):
+            StateDifference(**told)  # type: ignore[arg-type]
 
 
 def test_kept_and_read_back(tmp_path: Path) -> None:

@@ -8,7 +8,16 @@ from itertools import permutations
 import pytest
 
 from pytest_simbench.records.record import Record
-from pytest_simbench.records.series import by_test, comparable, configurations, series, settled
+from pytest_simbench.records.series import (
+    RowKey,
+    by_test,
+    comparable,
+    configurations,
+    configured,
+    series,
+    settled,
+    side_by_side,
+)
 
 from .build import failed, record
 
@@ -38,7 +47,8 @@ def test_the_last_attempt_counts_once() -> None:
     assert settled([second, first]) == [second]
     again = record(metrics={"placed": 0.5})
     assert settled([first, again]) == [again]  # written later
-    assert settled([first, replace(second, status="interrupted")]) == [first]
+    cut = replace(second, status="interrupted")
+    assert settled([first, cut]) == settled([cut, first]) == [first]
 
 
 def test_seeds_tasks_modes_and_configurations_are_not_twins() -> None:
@@ -99,6 +109,13 @@ def test_a_parameter_that_changes_no_setting_still_tells_rows_apart() -> None:
     """Else each seed would count twice."""
     runs = [record(1, test=f"t.py::test_x[engine-headless-{p}]") for p in "ab"]
     assert [row.label for row in series(runs)] == ["[a]", "[b]"]
+
+
+def test_a_row_is_of_a_robot_a_swept_step_and_a_variant() -> None:
+    plain = record(1, test="t.py::test_x[engine-headless-ur5-fast]", robot={"name": "ur5"})
+    assert RowKey.of(plain) == ("engine", "headless", "tuned", "t.py::test_x", "ur5-fast")
+    swept = plain.noting(own_timestep=0.001)  # at 2 ms
+    assert RowKey.of(swept).parameters == "ur5-dt=2ms-fast"
 
 
 def test_one_row_needs_no_label_and_functions_have_theirs() -> None:
@@ -166,6 +183,26 @@ def test_robots_are_told_by_name_alone_and_what_else_differs_beside() -> None:
     ]
 
 
+def test_what_differs_within_a_run_tells_configurations_apart_in_all() -> None:
+    one, fine = record(1), record(2, settings={"timestep": 0.001})
+    later = [replace(r, versions={"engine": "2.0"}) for r in (one, fine)]
+    alone, other = replace(one, versions={"engine": "3.0"}), record(1, simulator="other")
+    found = configured([one, *later, fine, alone, other], lambda r: str(r.versions))
+    assert found == {
+        (*one.who, "timestep=0.002"): [one, later[0], alone],
+        (*one.who, "timestep=0.001"): [fine, later[1]],
+        other.who: [other],
+    }
+
+
+def test_a_simulator_is_the_baseline_of_others_by_their_tests() -> None:
+    ids = [(s, f"test_{n}[{s}-headless]") for s in "abc" for n in "xy"]
+    runs = [record(1, test=test, simulator=s) for s, test in ids]
+    before, now = side_by_side(runs[:-1], "a", ["b", "c"])
+    assert [(r.simulator, r.test) for r in before] == [*ids[2:5], ("c", "test_y[a-headless]")]
+    assert list(now) == runs[2:-1]
+
+
 def test_rows_are_ranked_only_where_the_same_was_asked() -> None:
     ours, other = record(1), record(1, simulator="b", test="test_stacking[b-headless]")
 
@@ -185,6 +222,8 @@ def test_rows_are_ranked_only_where_the_same_was_asked() -> None:
     real, paper = (series([replace(ours, profile="real", **of)])[0] for of in ({}, {"jitter": 9.0}))
     assert comparable(rows[0], real, profiles=True)
     assert not comparable(rows[0], paper, profiles=True)
+    swept = series([ours, replace(ours, settings={"timestep": 9.0})])  # each has a label
+    assert all(comparable(row, series([other])[0]) for row in swept)
     runs = [record(1, test=f"test_{n}[{s}]", simulator=s) for s in "ab" for n in "xy"]
     found = {(row.key.simulator, row.label): row for row in series(runs)}
     assert comparable(found["a", "test_x"], found["b", "test_x"])

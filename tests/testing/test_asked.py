@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import permutations
 from typing import Any
 from unittest.mock import Mock
@@ -25,7 +25,7 @@ from tests.approval import assert_approved
 from tests.made_up_world import MadeUp
 
 LEFT_OUT = """
-    fresh_processes_agree imports_without_engine parity_of_full_scene planted_faults_are_seen
+    fresh_processes_agree imports_without_engine planted_faults_are_seen
     read_back_is_the_engines reading_changes_nothing reused_process_agrees thrown_cube_flies_free
     time_advances unknown_setting_rejected window_changes_nothing worlds_leave_no_memory
 """
@@ -115,15 +115,23 @@ class Questioned(Subject):
         yield Asked(scene, self.told)
 
 
+UNABLE = type("Unable", (MuJoCo,), {"info": replace(MuJoCo.info, capabilities=frozenset())})
+"""It can only what every engine can."""
+
+ANOTHER = "moves_as_prescribed parity_of_full_scene parity_where_links_collide"
+"""Checks that ask it something else."""
+
+
 def test_checks_ask_this() -> None:
     texts = []
-    for name in (name for name in CHECKS if name not in LEFT_OUT.split()):
-        subject = Questioned(MuJoCo)
+    asked = [(MuJoCo, name) for name in CHECKS if name not in LEFT_OUT.split()]
+    for cls, name in [*asked, *((UNABLE, name) for name in ANOTHER.split())]:
+        subject = Questioned(cls)
         with pytest.MonkeyPatch.context() as patch:
             for module in vars(kit).values():
                 for function in ("require", "require_close"):
                     if hasattr(module, function):
                         patch.setattr(module, function, getattr(subject.told, function))
             CHECKS[name].law(subject)
-        texts.append(f"{name}\n{subject.told.text()}\n")
+        texts.append(f"{name}{'' if cls is MuJoCo else ', unable'}\n{subject.told.text()}\n")
     assert_approved("kit", "\n".join(texts))

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import re
 import warnings
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from pytest_simbench.sims.mujoco.adapter import MuJoCo
+from pytest_simbench.sims.mujoco.settings import MuJoCoSettings
 
 from pytest_simbench.client.errors import SceneRefused, Where
 from pytest_simbench.motion.model import RobotModel
 from pytest_simbench.motion.registry import BUILT_IN, find
 from pytest_simbench.simulator.registry import UnknownSimulatorError
-from pytest_simbench.testing import CHECKS, ConformanceTest, ConformanceWarning, Subject
+from pytest_simbench.testing import (
+    CHECKS,
+    ConformanceTest,
+    ConformanceWarning,
+    Subject,
+    scenes,
+    subject,
+)
 from pytest_simbench.testing.faults import robot_faults, rounds
 from pytest_simbench.testing.kit import (
     Kit,
@@ -42,6 +53,59 @@ def test_ids_name_other_robots_than_the_panda_and_a_law_about_no_robot_is_one_te
         "mujoco-tuned-so101-static_hold",
     ]
     assert len(ids) == 1 + 2 * 3
+
+
+@dataclass(frozen=True)
+class Answering(Subject):
+    """Says this when a simulator is made, without a process."""
+
+    said: str = ""
+
+    def shared(self) -> Any:
+        return self
+
+    def construct(self, process: object, changes: object = None, gui: bool = False) -> Any:
+        assert (process, changes, gui) == (self, {"no_such_setting": 1}, False)
+        if self.said:
+            raise SceneRefused(self.said, Where("mujoco", "headless"))
+
+
+def test_an_unknown_setting_must_be_refused_with_those_that_there_are() -> None:
+    law, known = CHECKS["unknown_setting_rejected"].law, [f.name for f in fields(MuJoCoSettings)]
+    law(Answering(MuJoCo, said=" ".join(known)))
+    for said, told in (
+        ("", "an unknown setting was accepted"),
+        (" ".join(known[1:]), f"does not list ['{known[0]}']: {known[1]}"),
+    ):
+        with pytest.raises(ConformanceFailure, match=re.escape(told)):
+            law(Answering(MuJoCo, said=said))
+
+
+@pytest.mark.parametrize("costly", [True, False])
+def test_a_worker_gets_what_its_engine_needs(monkeypatch: pytest.MonkeyPatch, costly: bool) -> None:
+    info = replace(MuJoCo.info, name="own", costly_start=costly, compile_timeout=77.0)
+    own = type("Own", (MuJoCo,), {"info": info, "__module__": "some.where"})
+    monkeypatch.setattr(subject, "WorkerProcess", lambda *given: given)
+    for gui, mode in ((True, "gui"), (False, "headless")):
+        launch, where = Subject(own, python="/opt/python").launch(gui=gui)  # type: ignore[misc]
+        assert (launch.adapter, launch.python) == ("some.where:Own", "/opt/python")
+        assert (launch.stall_timeout, launch.compile_timeout) == (120.0, 77.0 if costly else 0.0)
+        assert launch.log.name.startswith("own-")
+        assert where == Where("own", mode)
+
+
+def test_shared_workers_are_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    living, dead = Mock(alive=True), Mock(alive=False)
+    shared = {(None, "a", "a"): living, (None, "b", "b"): dead}
+    monkeypatch.setattr(subject, "_shared", shared)
+    subject.close_workers()
+    assert (living.close.call_count, dead.close.call_count, shared) == (1, 0, {})
+
+
+def test_links_that_no_cube_reaches_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(scenes, "_POSTURES", 0)
+    with pytest.raises(LookupError, match="^no cube can be flown to panda_link1, .* of panda$"):
+        list(approaches(find("panda")))
 
 
 def test_what_a_hand_cannot_do_is_skipped_with_the_reason() -> None:
@@ -163,6 +227,22 @@ def test_line_without_reason_is_an_error(tmp_path: Path, line: str) -> None:
 def test_line_that_matches_nothing_warns() -> None:
     with pytest.warns(ConformanceWarning, match="'free_fal' matches no check; there are"):
         conformance_checks("mujoco", expected_failures={"free_fal": "typing error"})
+
+
+def test_each_adapter_is_asked_with_each_profile_by_its_own_interpreter() -> None:
+    other = type("Other", (MuJoCo,), {"info": replace(MuJoCo.info, name="other")})
+    mark: Any = conformance_checks(
+        "mujoco", other, profiles=("default", "tuned"), python={"other": "/opt/python"},
+        only=["free_fall"],
+    )  # fmt: skip
+    (kit,) = mark.args
+    told = [(s.cls.info.name, s.profile, s.python, s.robot) for s in kit.subjects]
+    assert told == [
+        (name, profile, python, None)
+        for name, python in (("mujoco", None), ("other", "/opt/python"))
+        for profile in ("default", "tuned")
+    ]
+    assert (kit.names, kit.expected_failures) == (("free_fall",), {})
 
 
 def test_unknown_names_list_the_known() -> None:
