@@ -6,17 +6,19 @@ import io
 import re
 import sys
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
+from pytest_simbench.client.display import Displays
 from pytest_simbench.experiment.experiment import Experiment
 from pytest_simbench.records.record import Failure
 from pytest_simbench.report.files import write_outcome
 from pytest_simbench.report.model.outcome import begun
-from tests.approval import assert_approved
+from tests.approval import assert_approved, in_words
 from tests.made_up import MadeUp
 
 TESTS = """
@@ -88,6 +90,10 @@ class Runs:
     def end(self, experiment: Experiment, number: int) -> tuple[dict[str, Any], None]:
         if number == self.cut:
             raise KeyboardInterrupt
+        case = experiment.case
+        with Path("cases").open("a") as file:
+            told = replace(case, robot=case.robot and case.robot.name)
+            file.write(f"{in_words(told)}\n" * (number == 1))
         used = {"rss_mb": {"mean": 200.0 + number, "peak": 300.0}, "cpu_percent": {"mean": 50.0}}
         found = {
             "resources": used, "timeline": {"start": 1.0, "end": 1.0 + 0.1 * number},
@@ -124,6 +130,7 @@ def run(words: str, landed: float = 0.5, cut: int = 99) -> str:
         )
     told = [f"$ pytest {words}", PYTESTS.sub("", said.getvalue()), f"exit code {int(code)}"]
     told += [Path("b.json").read_text()] if Path("b.json").exists() else []
+    assert Path("j.xml").exists(), told
     for case in ElementTree.parse("j.xml").iter("testcase"):
         properties = [f"{p.get('name')}={p.get('value')}" for p in case.iter("property")]
         lost = [(e.get("message") or "").partition("\n")[0] for e in case if e.get("message")]
@@ -181,3 +188,68 @@ def test_one_whose_page_cannot_be_written() -> None:
 )
 def test_others(name: str, words: str) -> None:
     assert_approved(f"run-{name}", run(f"--sim-output=out {words}"))
+
+
+ASKED = """
+import pytest
+from pytest_simbench.tasks import Throwing
+from tests.tiny import Falling
+
+@pytest.fixture
+def sim_settings(request):
+    return {"noslip_iterations": 3} if request.function is test_own else {}
+
+@pytest.mark.reps(2)
+@pytest.mark.sim_timeout(50)
+@pytest.mark.parametrize("a", ["b"])
+def test_own(repeat, a):
+    repeat(Falling())
+
+@pytest.mark.policies("")
+def test_files(repeat, policy, scene_file):
+    scene_file()
+    repeat(Falling(0.2))
+
+def test_arm(repeat):
+    repeat(Throwing())
+
+class Rolling(Falling):
+    name, study_timeout = "rolling", 30  # no decimal point
+
+@pytest.mark.parametrize("task", [Falling(0.1), Rolling(0.7)])
+@pytest.mark.reps(1)
+def test_alone(repeat, task):
+    repeat(task)
+"""
+
+TYPED = (
+    "--sim-profile=tuned,own.toml --sim-set=mujoco.timestep=0.004 --sim-seed=3 "
+    "--sim-timeout=7 --sim-stall-timeout=9 --sim-memory-limit=500 --jitter=2 --sim-fresh "
+    "--sim-trace=off --protocol=paper --sim-jobs=2 --policies=mine.py:one,mine.py:two --gui "
+    "--sim-scene=scene.xml"
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("scene", "--sim-record=mcap --sim-scene=scene.xml -k step"),
+     ("typed", f"test_runs.py -k one {TYPED}"),
+     ("robots", "--robot=all --protocol=smoke --headless -k arm"),
+     ("plain", "test_runs.py --sim-video=retain-on-failure")],
+)  # fmt: skip
+def test_how_repetitions_are_run(name: str, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the options, the ini file, the test's marks, settings and files say of them; and that
+    the same command finds none to be missing."""
+    pytest.importorskip("av", reason="videos need the extra 'video'")
+    monkeypatch.setattr(Displays, "environment", lambda self: {})
+    Path("test_runs.py").write_text(ASKED)
+    Path("mine.py").write_text("policies = {'one': lambda seen: None, 'two': lambda seen: None}")
+    Path("own.toml").write_text('simulator = "mujoco"\n[settings]\nnoslip_iterations = 5\n')
+    box = '<body pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1"/></body>'
+    Path("scene.xml").write_text(f"<mujoco><worldbody>{box}</worldbody></mujoco>")
+    text = run(f"--sim-output=out {words}")
+    size = Path("cases").stat().st_size
+    cases = re.sub(r"<.*? object at 0x\w+>", "OBJECT", Path("cases").read_text())
+    assert "exit code 0" in run(f"--sim-resume=out {words}")
+    assert Path("cases").stat().st_size == size
+    assert_approved(f"run-asked-{name}", text + cases.replace(f"{Path.cwd()}/", "DIR/"))
