@@ -13,8 +13,10 @@ from xml.etree import ElementTree
 import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
-from pytest_simbench.plugin.compare import _name
+from pytest_simbench.plugin.compare import _name, prepare
 from pytest_simbench.records.baseline import read_baseline
+from pytest_simbench.records.folder import RunContents
+from tests.plugin.conftest import Configure
 from tests.plugin.inner import NOTHING_LANDS, run_before, run_pytest
 
 TEST = """
@@ -43,6 +45,20 @@ def baseline(pytester: pytest.Pytester, saved: Path) -> Path:
     """The folder of the inner pytest, with that run in it."""
     shutil.copytree(saved, pytester.path, dirs_exist_ok=True)
     return pytester.path
+
+
+@pytest.mark.parametrize("limits", [(), ("--sim-compare-fail=ram:5%",)])
+def test_versions_of_a_run_are_compared_with_one_of_them(
+    configure: Configure, limits: tuple[str, ...]
+) -> None:
+    names = ["ode", "mujoco==1.0", "mujoco", "mujoco==2.0"]
+    found = prepare(configure("--sim-baseline=mujoco", *limits), [], names)
+    assert found is not None
+    assert (found.baseline, found.typed) == (RunContents("mujoco in this run"), bool(limits))
+    assert (found.beside, len(found.limits)) == (("mujoco", [names[1], names[3]]), len(limits))
+    with pytest.raises(pytest.UsageError, match="no other version of ode"):
+        prepare(configure("--sim-baseline=ode"), [], names)
+    assert prepare(configure(), [], names) is None
 
 
 @pytest.mark.parametrize(

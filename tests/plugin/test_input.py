@@ -98,6 +98,9 @@ BAD = {
     "--sim-resume=bad": "--sim-resume: *bad/records.jsonl:1: not JSON",
     "--sim-data=hree": "--sim-data: hree is no folder; name the one that holds",
     "--sim-record=mcap --sim-trace=off": "leave --sim-trace=off out",
+    "--sim-cluster=tcp://127.0.0.1:1 --sim-video=on": "--sim-video is for simulators on this",
+    "--sim-cluster=tcp://127.0.0.1:1 --sim-pictures": "--sim-pictures is for simulators on this",
+    "--sim-cluster=tcp://127.0.0.1:1 --sim-jobs=2": "leave out --sim-jobs; each node says itself",
     # Scenes.
     "--sim-scene=none.xml": "none.xml*No such file",
     "--sim-scene=scene.sdf": "scene.sdf*not read yet",

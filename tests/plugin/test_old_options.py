@@ -48,6 +48,15 @@ def test_an_old_option_is_a_command(
     assert f"will go with the next release; write: simbench {command}\n" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("status", "code"), [(0, 0), (1, 1), (main.BAD_INPUT, 4), (130, 2)])
+def test_the_run_ends_as_the_command_does(
+    configure: Configure, monkeypatch: pytest.MonkeyPatch, status: int, code: int
+) -> None:
+    monkeypatch.setattr(main, "main", lambda words: status)
+    config = configure("--sim-environments")
+    assert old_options.run_command(config, old_options.asked(config)) == code
+
+
 def test_an_old_option_that_cannot_be(pytester: pytest.Pytester) -> None:
     result = run_pytest(pytester, "--sim-merge none")
     usage_error(

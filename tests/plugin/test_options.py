@@ -17,7 +17,8 @@ from pytest_simbench.cli.values import Auto, BadValue, flag
 from pytest_simbench.plugin import options, registration
 from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS, Option
-from pytest_simbench.plugin.selection import select
+from pytest_simbench.plugin.selection import parse, select
+from pytest_simbench.simulator import registry
 from tests.plugin.conftest import Configure
 from tests.plugin.inner import run_pytest
 
@@ -194,6 +195,14 @@ def test_help_shows_an_option_once_and_no_old_one(pytester: pytest.Pytester) -> 
 def test_informational_commands(pytester: pytest.Pytester, command: str) -> None:
     pytester.makepyfile("def test_it(repeat):\n    pass\n")
     run_pytest(pytester, command, ret=0)
+
+
+def test_without_a_name_every_simulator_is_meant(configure: Configure) -> None:
+    every = tuple(registry.known())
+    assert parse(configure()).simulators == parse(configure("--sim=all")).simulators == every
+    first, *others = every
+    assert parse(configure(f"--sim={first}")).simulators == (first,)
+    assert parse(configure(f"--sim={others[0]},all")).simulators == every
 
 
 def test_a_profile_of_a_file(configure: Configure) -> None:
