@@ -97,6 +97,23 @@ def test_one_that_is_cut_and_completed_in_part_has_not_passed(killed: bool) -> N
     assert '"color": "brightgreen"' in run("--sim-resume=cut -k high")
 
 
+def test_one_whose_failed_test_is_mended(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = "-k 'whole or high'"
+    text = run(f"--sim-output=out {words}")
+    Path("test_runs.py").write_text(TESTS.replace("assert 1 == 2", "assert 2 == 2"))
+    monkeypatch.delitem(sys.modules, "test_runs")
+    assert_approved("run-mended", text + run(f"--sim-resume=out {words}"))
+
+
+def test_who_tells_no_task_that_it_repeats_fails() -> None:
+    test = '@pytest.mark.parametrize("a", [3])\n@pytest.mark.repeats("a")\ndef test_it(repeat, a):'
+    Path("test_runs.py").write_text(
+        f"import pytest\nfrom tests.tiny import Falling\n{test} repeat(Falling())\n"
+    )
+    told = "test_it[mujoco-headless-3]: repeats needs the name of a parameter that holds a task; "
+    assert f"Failed: test_runs.py::{told}choose from a" in run("--sim-jobs=2")
+
+
 def test_one_whose_page_cannot_be_written() -> None:
     Path("out/report.html").mkdir(parents=True)
     assert_approved("run-unwritten", run("--sim-output=out -k low"))
@@ -137,6 +154,10 @@ class TestOwn:
 def test_files(repeat, policy, scene_file):
     scene_file()
     repeat(Falling(0.2))
+
+def test_one_and_another(repeat):
+    repeat(Falling(0.3))
+    repeat(Falling(0.4))
 
 def test_one_end(output_path):
     found = {"sentence": "5 mm in x change it"}
