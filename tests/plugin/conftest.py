@@ -20,7 +20,8 @@ def configure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Confi
     with ExitStack() as ends:
 
         def made(*words: str) -> pytest.Config:
-            config = _prepareconfig([*words])
+            # Captured, output would go to a file that `capsys` has closed before.
+            config = _prepareconfig(["--capture=no", *words])
             ends.callback(config._ensure_unconfigure)
             return config
 
