@@ -20,6 +20,7 @@ from tests.approval import assert_approved_line
 from tests.motion.small_arm import TOML, small_arm
 from tests.plugin.conftest import Configure
 from tests.plugin.inner import CLAIMING, run_pytest, usage_error, wrapper
+from tests.plugin.whole import prepare, run
 
 LIMIT = "--sim-baseline=good --sim-compare-fail"
 
@@ -213,15 +214,14 @@ BAD_MARKS = [
 ]
 
 
-def test_bad_marks_are_told_all_at_once(pytester: pytest.Pytester) -> None:
+def test_bad_marks_are_told_all_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tests = (
         f"@pytest.mark.{mark}\ndef test_{number}(repeat):\n    pass\n"
         for number, (mark, _) in enumerate(BAD_MARKS)
     )
-    pytester.makepyfile("\n".join(["import pytest", *tests]))
-    result = run_pytest(pytester, "--sim=mujoco")
-    usage_error(result)
-    lines = [*result.stdout.lines, *result.stderr.lines]
+    prepare(tmp_path, monkeypatch, "\n".join(["import pytest", *tests]))
+    lines = run("").splitlines()
+    assert "exit code 4" in lines
     for number, (_, message) in enumerate(BAD_MARKS):
         (told,) = (line for line in lines if f"::test_{number}: " in line)
         assert all(part in told for part in message.split("*")), told

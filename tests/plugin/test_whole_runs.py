@@ -102,7 +102,8 @@ def test_one_whose_failed_test_is_mended(monkeypatch: pytest.MonkeyPatch) -> Non
     text = run(f"--sim-output=out {words}")
     Path("test_runs.py").write_text(TESTS.replace("assert 1 == 2", "assert 2 == 2"))
     monkeypatch.delitem(sys.modules, "test_runs")
-    assert_approved("run-mended", text + run(f"--sim-resume=out {words}"))
+    text += run(f"--sim-resume=out {words}")
+    assert_approved("run-mended", text + run("--sim-resume=out -k high"))
 
 
 def test_who_tells_no_task_that_it_repeats_fails() -> None:

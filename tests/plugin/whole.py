@@ -88,8 +88,8 @@ def run(words: str, landed: float = 0.5, cut: int = 99) -> str:
         )
     told = [f"$ pytest {words}", PYTESTS.sub("", said.getvalue()), f"exit code {int(code)}"]
     told += [Path("b.json").read_text()] if Path("b.json").exists() else []
-    assert Path("j.xml").exists(), told
-    for case in ElementTree.parse("j.xml").iter("testcase"):
+    ran = Path("j.xml").exists()
+    for case in ElementTree.parse("j.xml").iter("testcase") if ran else ():
         properties = [f"{p.get('name')}={p.get('value')}" for p in case.iter("property")]
         lost = [(e.get("message") or "").partition("\n")[0] for e in case if e.get("message")]
         lost += [f"text: {e.text}" for e in case if "Failed: " in (e.get("message") or "")]
