@@ -98,9 +98,14 @@ def test_one_that_is_cut_and_completed_in_part_has_not_passed(killed: bool) -> N
 
 
 def test_one_whose_failed_test_is_mended(monkeypatch: pytest.MonkeyPatch) -> None:
-    words = "-k 'whole or high'"
+    """Also one that repeats nothing."""
+    words, tests = (
+        "-k 'whole or high or none'",
+        f"{TESTS}\ndef test_none(sim_name): assert 1 == 2\n",
+    )
+    Path("test_runs.py").write_text(tests)
     text = run(f"--sim-output=out {words}")
-    Path("test_runs.py").write_text(TESTS.replace("assert 1 == 2", "assert 2 == 2"))
+    Path("test_runs.py").write_text(tests.replace("assert 1 == 2", "assert 2 == 2"))
     monkeypatch.delitem(sys.modules, "test_runs")
     text += run(f"--sim-resume=out {words}")
     assert_approved("run-mended", text + run("--sim-resume=out -k high"))
@@ -153,7 +158,8 @@ class TestOwn:
 
 @pytest.mark.policies("")
 def test_files(repeat, policy, scene_file):
-    scene_file()
+    assert scene_file().free_bodies
+    assert policy is not None
     repeat(Falling(0.2))
 
 def test_one_and_another(repeat):
