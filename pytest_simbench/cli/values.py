@@ -132,7 +132,7 @@ class Number:
         fine = isinstance(value, types) and not isinstance(value, bool) and isfinite(value)
         if not (fine and self.low <= value <= self.high):
             raise BadValue(value if given is None else given, self.advice)
-        return int(value) if self.whole else value
+        return int(value) if self.whole else float(value)
 
     @property
     def advice(self) -> str:

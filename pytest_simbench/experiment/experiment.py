@@ -111,7 +111,7 @@ class Experiment:
     @property
     def timeout(self) -> float:
         """Of a repetition from launch [s]."""
-        return self.case.timeout or self.task.study_timeout
+        return float(self.case.timeout or self.task.study_timeout)
 
     @property
     def limits(self) -> dict[str, float | None]:

@@ -1,11 +1,8 @@
-"""What is refused with nodes, and what the end of a run says of them (what they do:
-`tests/cluster`)."""
+"""What the end of a run says of nodes (what they do: `tests/cluster`)."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-
-import pytest
 
 from pytest_simbench.plugin.cluster import lost_nodes
 from pytest_simbench.records.notes import Notes
@@ -21,11 +18,3 @@ def test_what_was_tried_again_is_counted() -> None:
     )
     assert told.startswith("nodes were lost: 2 of the repetitions")
     assert "1 of them failed for it" in told
-
-
-@pytest.mark.parametrize("option", ["--sim-video=on", "--sim-pictures"])
-def test_what_a_node_cannot_send_back_is_refused(option: str, pytester: pytest.Pytester) -> None:
-    pytester.makepyfile("def test_it(repeat): pass")
-    result = pytester.runpytest("--sim=mujoco", "--sim-cluster=tcp://127.0.0.1:1", option)
-    assert result.ret == pytest.ExitCode.USAGE_ERROR
-    result.stderr.fnmatch_lines(["*is for simulators on this machine; leave out one of them"])

@@ -13,9 +13,13 @@ from xml.etree import ElementTree
 import pytest
 
 import pytest_simbench.tasks  # noqa: F401 - pytester would import native modules a second time
-from pytest_simbench.plugin.compare import _name
+from pytest_simbench.plugin.compare import _name, prepare
 from pytest_simbench.records.baseline import read_baseline
+from pytest_simbench.records.description import TaskDescription
+from pytest_simbench.records.folder import RunContents
+from tests.plugin.conftest import Configure
 from tests.plugin.inner import NOTHING_LANDS, run_before, run_pytest
+from tests.report.samples import STACKING, record
 
 TEST = """
     import os
@@ -43,6 +47,29 @@ def baseline(pytester: pytest.Pytester, saved: Path) -> Path:
     """The folder of the inner pytest, with that run in it."""
     shutil.copytree(saved, pytester.path, dirs_exist_ok=True)
     return pytester.path
+
+
+@pytest.mark.parametrize("limits", [(), ("--sim-compare-fail=ram:5%",)])
+def test_versions_of_a_run_are_compared_with_one_of_them(
+    configure: Configure, limits: tuple[str, ...]
+) -> None:
+    names = ["ode", "mujoco==1.0", "mujoco", "mujoco==2.0"]
+    found = prepare(configure("--sim-baseline=mujoco", *limits), [], names)
+    assert found is not None
+    assert (found.baseline, found.typed) == (RunContents("mujoco in this run"), bool(limits))
+    assert (found.beside, len(found.limits)) == (("mujoco", [names[1], names[3]]), len(limits))
+    of = [(name, k) for name in names for k in range(1, 7)]
+    worse = {"mujoco==2.0": 0.1}
+    run = [record(who, k, metrics={"placed": worse.get(who, 0.9) + k / 1000}) for who, k in of]
+    found.make(RunContents("now", tuple(run), {"stacking": TaskDescription("stacking", STACKING)}))
+    told = [line.split()[:6] for line in found.text(120).splitlines() if " placed " in line]
+    assert told == [
+        [f"test_stacking[{name}-headless]", "placed", "90.35", "%", now, "%"]
+        for name, now in (("mujoco==1.0", "90.35"), ("mujoco==2.0", "10.35"))
+    ]
+    with pytest.raises(pytest.UsageError, match="no other version of ode"):
+        prepare(configure("--sim-baseline=ode"), [], names)
+    assert prepare(configure(), [], names) is None
 
 
 @pytest.mark.parametrize(

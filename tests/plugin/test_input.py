@@ -18,7 +18,9 @@ from pytest_simbench.records.description import TaskDescription
 from pytest_simbench.records.metrics import Metric
 from tests.approval import assert_approved_line
 from tests.motion.small_arm import TOML, small_arm
+from tests.plugin.conftest import Configure
 from tests.plugin.inner import CLAIMING, run_pytest, usage_error, wrapper
+from tests.plugin.whole import prepare, run
 
 LIMIT = "--sim-baseline=good --sim-compare-fail"
 
@@ -97,6 +99,9 @@ BAD = {
     "--sim-resume=bad": "--sim-resume: *bad/records.jsonl:1: not JSON",
     "--sim-data=hree": "--sim-data: hree is no folder; name the one that holds",
     "--sim-record=mcap --sim-trace=off": "leave --sim-trace=off out",
+    "--sim-cluster=tcp://127.0.0.1:1 --sim-video=on": "--sim-video is for simulators on this",
+    "--sim-cluster=tcp://127.0.0.1:1 --sim-pictures": "--sim-pictures is for simulators on this",
+    "--sim-cluster=tcp://127.0.0.1:1 --sim-jobs=2": "leave out --sim-jobs; each node says itself",
     # Scenes.
     "--sim-scene=none.xml": "none.xml*No such file",
     "--sim-scene=scene.sdf": "scene.sdf*not read yet",
@@ -120,9 +125,10 @@ FILES = {
 
 
 @pytest.fixture
-def files(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+def files(configure: Configure, monkeypatch: pytest.MonkeyPatch) -> None:
     """What the command lines name, and no environment of a simulator."""
-    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(pytester.path / "environments"))
+    folder = Path.cwd()
+    monkeypatch.setenv("SIMBENCH_ENVIRONMENTS", str(folder / "environments"))
     records = Path(__file__).parents[1] / "measure" / "stacking_records.jsonl"
     metrics = [Metric("landed", "landed", better="lower"), Metric("landing_x", "x", better=None),
                Metric("placed", "placed", kind="share", of=15)]  # fmt: skip
@@ -132,20 +138,20 @@ def files(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
         "good/tasks.jsonl": json.dumps(said) + "\n",
     }
     for name, text in {**FILES, **good}.items():
-        path = pytester.path / name
+        path = folder / name
         path.parent.mkdir(exist_ok=True)
         path.write_text(text)
     for name in ("a", "b"):
-        wrapper(pytester.path / name / "python")
-    (pytester.path / "link").symlink_to("nowhere/at/all")
-    small_arm(pytester.path, TOML.replace("2000.0", "-1")).rename(pytester.path / "bad.toml")
+        wrapper(folder / name / "python")
+    (folder / "link").symlink_to("nowhere/at/all")
+    small_arm(folder, TOML.replace("2000.0", "-1")).rename(folder / "bad.toml")
 
 
-def refusal(pytester: pytest.Pytester, words: str) -> str:
+def refusal(configure: Configure, words: str) -> str:
     """What is said of a command line before anything is collected: one sentence."""
 
     def begin() -> None:
-        session = session_of(pytester.parseconfig(*shlex.split(words)))
+        session = session_of(configure(*shlex.split(words)))
         session.check_options()
         session.pytest_sessionstart()
 
@@ -154,14 +160,16 @@ def refusal(pytester: pytest.Pytester, words: str) -> str:
     told = str(raised.value)
     assert "\n" not in told
     if "/proc" not in words:  # which depends on the machine
-        assert_approved_line("refused", f"{words:.80}: {told}".replace(f"{pytester.path}", "DIR"))
+        assert_approved_line("refused", f"{words:.80}: {told}".replace(str(Path.cwd()), "DIR"))
     return told
 
 
 @pytest.mark.usefixtures("files")
 @pytest.mark.parametrize("words", BAD)
-def test_bad_option(pytester: pytest.Pytester, words: str) -> None:
-    assert fnmatchcase(refusal(pytester, words), f"*{BAD[words]}*")
+def test_bad_option(configure: Configure, words: str) -> None:
+    if "--sim-scene" in words:
+        pytest.importorskip("mujoco")
+    assert fnmatchcase(refusal(configure, words), f"*{BAD[words]}*")
 
 
 @pytest.mark.parametrize(
@@ -169,7 +177,7 @@ def test_bad_option(pytester: pytest.Pytester, words: str) -> None:
     [("rosbags", "--sim-record=mcap", "ros"), ("av", "--sim-video=first", "video")],
 )
 def test_a_missing_package_is_told(
-    pytester: pytest.Pytester,
+    configure: Configure,
     monkeypatch: pytest.MonkeyPatch,
     package: str,
     option: str,
@@ -178,7 +186,7 @@ def test_a_missing_package_is_told(
     find = importlib.util.find_spec
     for place in ("pytest_simbench.recordings.film.find_spec", "importlib.util.find_spec"):
         monkeypatch.setattr(place, lambda name: None if name == package else find(name))
-    told = refusal(pytester, option)
+    told = refusal(configure, option)
     assert told.startswith(f"{option}: ")
     assert told.endswith(f"pip install 'pytest-simbench[{extra}]'")
 
@@ -206,15 +214,14 @@ BAD_MARKS = [
 ]
 
 
-def test_bad_marks_are_told_all_at_once(pytester: pytest.Pytester) -> None:
+def test_bad_marks_are_told_all_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tests = (
         f"@pytest.mark.{mark}\ndef test_{number}(repeat):\n    pass\n"
         for number, (mark, _) in enumerate(BAD_MARKS)
     )
-    pytester.makepyfile("\n".join(["import pytest", *tests]))
-    result = run_pytest(pytester, "--sim=mujoco")
-    usage_error(result)
-    lines = [*result.stdout.lines, *result.stderr.lines]
+    prepare(tmp_path, monkeypatch, "\n".join(["import pytest", *tests]))
+    lines = run("").splitlines()
+    assert "exit code 4" in lines
     for number, (_, message) in enumerate(BAD_MARKS):
         (told,) = (line for line in lines if f"::test_{number}: " in line)
         assert all(part in told for part in message.split("*")), told

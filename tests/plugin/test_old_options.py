@@ -7,14 +7,15 @@ import pytest
 from pytest_simbench.cli import main
 from pytest_simbench.plugin import old_options
 from tests.cli.command import simbench
+from tests.plugin.conftest import Configure
 from tests.plugin.inner import FALLING, distribution, importable, run_pytest, usage_error
 
 
-def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str) -> list[str]:
+def old(configure: Configure, monkeypatch: pytest.MonkeyPatch, *words: str) -> list[str]:
     """What the command is asked for by an old option."""
     given: list[list[str]] = []
     monkeypatch.setattr(main, "main", lambda words: given.append(words) or 0)
-    config = pytester.parseconfig(*words)
+    config = configure(*words)
     command = old_options.asked(config)
     assert old_options.run_command(config, command) == 0
     return given[0]
@@ -37,14 +38,23 @@ def old(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, *words: str)
     ],
 )  # fmt: skip
 def test_an_old_option_is_a_command(
-    pytester: pytest.Pytester,
+    configure: Configure,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     words: str,
     command: str,
 ) -> None:
-    assert old(pytester, monkeypatch, *words.split()) == command.split()
+    assert old(configure, monkeypatch, *words.split()) == command.split()
     assert f"will go with the next release; write: simbench {command}\n" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("status", "code"), [(0, 0), (1, 1), (main.BAD_INPUT, 4), (130, 2)])
+def test_the_run_ends_as_the_command_does(
+    configure: Configure, monkeypatch: pytest.MonkeyPatch, status: int, code: int
+) -> None:
+    monkeypatch.setattr(main, "main", lambda words: status)
+    config = configure("--sim-environments")
+    assert old_options.run_command(config, old_options.asked(config)) == code
 
 
 def test_an_old_option_that_cannot_be(pytester: pytest.Pytester) -> None:

@@ -6,18 +6,20 @@ The tests go through `OPTIONS`, so that a new option is covered as soon as it is
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain, repeat
+from pathlib import Path
 
 import pytest
 
-import pytest_simbench.motion.registry  # noqa: F401 - or pytester imports it again
 from pytest_simbench.cli.values import Auto, BadValue, flag
 from pytest_simbench.plugin import options, registration
 from pytest_simbench.plugin.old_options import OLD_OPTIONS
 from pytest_simbench.plugin.options import OPTIONS, Option
-from pytest_simbench.plugin.selection import select
+from pytest_simbench.plugin.selection import parse, select
+from pytest_simbench.simulator import registry
+from tests.plugin.conftest import Configure
 from tests.plugin.inner import run_pytest
 
 NAMES = [option.name for option in OPTIONS]
@@ -44,13 +46,6 @@ FINE = {
 
 LATER = {"sim_profile"}
 """Options of names that are looked up when they are used: any word will do for a start."""
-
-Configure = Callable[..., pytest.Config]
-
-
-@pytest.fixture
-def configure(pytester: pytest.Pytester) -> Configure:
-    return pytester.parseconfig
 
 
 def checked(config: pytest.Config) -> None:
@@ -116,25 +111,25 @@ def test_bad_values_in_the_ini_file(configure: Configure, name: str) -> None:
 
 @pytest.mark.parametrize("name", [o.name for o in OPTIONS if o.type is flag and o.ini])
 @pytest.mark.parametrize(("word", "value"), [("yes", True), ("TRUE", True), ("off", False)])
-def test_ini_flags(pytester: pytest.Pytester, name: str, word: str, value: bool) -> None:
-    assert options.value(pytester.parseconfig("-o", f"{name}={word}"), name) is value
+def test_ini_flags(configure: Configure, name: str, word: str, value: bool) -> None:
+    assert options.value(configure("-o", f"{name}={word}"), name) is value
 
 
 @pytest.mark.parametrize("option", [o for o in OPTIONS if o.long], ids=lambda o: o.flag)
-def test_the_sure_name_is_the_same_option(pytester: pytest.Pytester, option: Option) -> None:
+def test_the_sure_name_is_the_same_option(configure: Configure, option: Option) -> None:
     words = {"--sim": "mujoco", "--robot": "ur5", "--reps": "3", "--protocol": "smoke"}
     word = {**words, "--jitter": "2", "--policies": __file__}.get(option.flag)
     value = [] if word is None else [word]
-    by_flag = options.value(pytester.parseconfig(option.flag, *value), option.name)
-    by_long = options.value(pytester.parseconfig(option.long, *value), option.name)
+    by_flag = options.value(configure(option.flag, *value), option.name)
+    by_long = options.value(configure(option.long, *value), option.name)
     assert by_flag == by_long != option.default
     for name in option.ini_names:
         ini = f"{name}={word or 'true'}"
-        assert options.value(pytester.parseconfig("-o", ini), option.name) == by_flag
+        assert options.value(configure("-o", ini), option.name) == by_flag
 
 
-def test_values_that_are_given_in_parts(pytester: pytest.Pytester) -> None:
-    config = pytester.parseconfig(
+def test_values_that_are_given_in_parts(configure: Configure) -> None:
+    config = configure(
         "--sim=mujoco,pybullet", "--sim=drake", "--sim-set=mujoco.timestep=1,pybullet.timestep=2",
         "--sim-spec=mujoco=popen//python=a,b=c d", "--sim-resume", "--reps=auto:7",
     )  # fmt: skip
@@ -146,28 +141,28 @@ def test_values_that_are_given_in_parts(pytester: pytest.Pytester) -> None:
     assert found["sim_resume"] is True
 
 
-def test_lists_in_the_ini_file(pytester: pytest.Pytester) -> None:
-    pytester.makeini(
-        """
-        [pytest]
-        sim_name = mujoco pybullet,drake
-        sim_set = mujoco.timestep=0.001
-            pybullet.timestep=0.002
-        sim_python = mujoco=/a b/python, 3
-            pybullet=~/x
-        """
+def test_lists_in_the_ini_file(configure: Configure) -> None:
+    Path("pytest.ini").write_text(
+        """\
+[pytest]
+sim_name = mujoco pybullet,drake
+sim_set = mujoco.timestep=0.001
+    pybullet.timestep=0.002
+sim_python = mujoco=/a b/python, 3
+    pybullet=~/x
+"""
     )
-    found = options.values(pytester.parseconfig())
+    found = options.values(configure())
     assert found["sim_name"] == ["mujoco", "pybullet", "drake"]
     assert found["sim_set"] == {"mujoco.timestep": "0.001", "pybullet.timestep": "0.002"}
     assert found["sim_python"] == {"mujoco": "/a b/python, 3", "pybullet": "~/x"}
 
 
-def test_the_same_in_pyproject(pytester: pytest.Pytester) -> None:
-    pytester.makepyprojecttoml(
+def test_the_same_in_pyproject(configure: Configure) -> None:
+    Path("pyproject.toml").write_text(
         '[tool.pytest.ini_options]\nsim_name = ["mujoco", "drake"]\nreps = "5"\ngui = "maybe"\n'
     )
-    config = pytester.parseconfig()
+    config = configure()
     with pytest.raises(pytest.UsageError, match="^the ini option gui=maybe: give true or false$"):
         options.values(config)
 
@@ -202,9 +197,19 @@ def test_informational_commands(pytester: pytest.Pytester, command: str) -> None
     run_pytest(pytester, command, ret=0)
 
 
-def test_a_profile_of_a_file(configure: Configure, pytester: pytest.Pytester) -> None:
+def test_without_a_name_every_simulator_is_meant(configure: Configure) -> None:
+    every = tuple(registry.known())
+    assert parse(configure()).simulators == parse(configure("--sim=all")).simulators == every
+    first, *others = every
+    assert parse(configure(f"--sim={first}")).simulators == (first,)
+    assert parse(configure(f"--sim={others[0]},all")).simulators == every
+
+
+def test_a_profile_of_a_file(configure: Configure) -> None:
+    pytest.importorskip("mujoco")
     text = 'simulator = "mujoco"\n[settings]\ntimestep = 0.004\n'
-    pytester.makefile(".toml", quick=text, wrong=text.replace("mujoco", "mujoko"))
+    Path("quick.toml").write_text(text)
+    Path("wrong.toml").write_text(text.replace("mujoco", "mujoko"))
     selection = select(configure("--sim-profile=quick.toml,tuned", "--sim=mujoco"))
     label, tuned = selection.profiles
     assert (label[:6], tuned) == ("quick-", "tuned")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import shlex
 from fnmatch import fnmatchcase
+from pathlib import Path
 
 import pytest
 
 import pytest_simbench.motion.planning  # noqa: F401 - pytester would import native modules a second time
+from tests.plugin.conftest import Configure
 from tests.plugin.inner import records, run_pytest
 from tests.plugin.test_input import refusal
 
@@ -114,10 +116,11 @@ def test_without_policies_the_shipped_ones_wait_for_their_file(pytester: pytest.
         ("mine.py:still,mine.py", "*two policies are named 'still'; give one of them another*"),
     ],
 )
-def test_what_is_no_policy(pytester: pytest.Pytester, spec: str, sentence: str) -> None:
-    pytester.makepyfile(
-        mine=MINE, empty="", list="policies = [3]", broken="import gone", number="policy = 3",
-        ends="raise SystemExit(3)",
-    )  # fmt: skip
-    pytester.makefile(".txt", text="policy = 3")
-    assert fnmatchcase(refusal(pytester, f"--policies={spec}"), sentence)
+def test_what_is_no_policy(configure: Configure, spec: str, sentence: str) -> None:
+    files = {
+        "mine.py": MINE, "empty.py": "", "list.py": "policies = [3]", "broken.py": "import gone",
+        "number.py": "policy = 3", "ends.py": "raise SystemExit(3)", "text.txt": "policy = 3",
+    }  # fmt: skip
+    for name, text in files.items():
+        Path(name).write_text(text)
+    assert fnmatchcase(refusal(configure, f"--policies={spec}"), sentence)

@@ -4,14 +4,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
 
 from pytest_simbench.cli.runs import recordings
+from pytest_simbench.plugin.recording import photograph, video_mode
 from pytest_simbench.recordings.trace import Trace
 from tests.cli.command import simbench
+from tests.plugin.conftest import Configure
 from tests.plugin.inner import FALLING, run_pytest
 from tests.report.samples import record
 
@@ -76,6 +80,18 @@ def test_what_could_not_be_recorded_fails_the_run_and_is_recorded_later(
 def test_a_run_without_traces_says_so(tmp_path: Path) -> None:
     told = ["no recordings: the run has no traces; see --sim-trace"]
     assert recordings(tmp_path, tmp_path, [record()]) == (told, True)
+
+
+def test_who_has_no_renderer_films_nothing_and_is_told_of_only_where_that_was_asked_for(
+    configure: Configure,
+) -> None:
+    told: list[str] = []
+    kept: Any = SimpleNamespace(case=SimpleNamespace(simulator="dart"))
+    for words in ((), ("--sim-video=on",), ("--sim-pictures",)):
+        photograph(configure(*words), kept, [], told.append)
+    assert told == ["dart has no renderer of its own: no pictures and no videos"] * 2
+    config = configure("--sim-video=on")
+    assert [video_mode(config, name) for name in ("dart", "mujoco")] == ["off", "on"]
 
 
 @pytest.mark.usefixtures("drawn")

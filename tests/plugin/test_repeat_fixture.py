@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock, call
 
 import pytest
 
 from pytest_simbench.experiment.variants import Variant
 from pytest_simbench.measure.results import ResultSet
 from pytest_simbench.plugin.marks import describe_failure
-from pytest_simbench.plugin.repeat_fixture import claim_of
+from pytest_simbench.plugin.repeat_fixture import RepeatFixture, claim_of
 from pytest_simbench.records.claims import Claim
 from tests.records.build import METRICS, failed, records
 
@@ -37,6 +39,17 @@ def test_all_that_is_kept_of_a_claim(threshold: float, verdict: Any, advice: str
         threshold=threshold, verdict=verdict, mean=bounds.mean, low=bounds.low, high=bounds.high,
         n=21, crashed=1, without=1, advice=advice, parameters="{}",
     )  # fmt: skip
+
+
+def test_an_attempt_that_is_taken_back_claims_and_tells_no_more() -> None:
+    node: Any = SimpleNamespace(user_properties=[("own", 1), ("crashed", 2)])
+    kept, case = Mock(), Mock()
+    fixture = RepeatFixture(node, case, SimpleNamespace(folder=SimpleNamespace(claim=kept)))
+    whole = Claim(**TEST, test="t.py::test_it", verdict="PASS", metric="placed")
+    fixture.claims, fixture.properties = [whole], [("crashed", 2)]
+    fixture.take_back()
+    assert node.user_properties == [("own", 1)]
+    assert kept.call_args_list == [call(replace(whole, verdict=""))]
 
 
 def test_all_that_is_kept_of_a_test_that_failed() -> None:

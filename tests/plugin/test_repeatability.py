@@ -3,13 +3,31 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import create_autospec
 
+import numpy as np
 import pytest
 
+from pytest_simbench.client.display import Displays
+from pytest_simbench.client.errors import DisplayError
+from pytest_simbench.experiment.case import PROTOCOLS, Case
+from pytest_simbench.experiment.experiment import Experiment
+from pytest_simbench.plugin import repeatability
+from pytest_simbench.plugin.repeatability import Perturber
+from pytest_simbench.records.repeatability import NAME, Line
+from pytest_simbench.repeatability import search, stability
+from pytest_simbench.repeatability.agreement import Sample
+from pytest_simbench.repeatability.perturbation import Perturbation
+from pytest_simbench.simulator.registry import adapter
 from tests.cli.command import simbench
 from tests.plugin.inner import distribution, importable, run_pytest
+from tests.tiny import Falling
 
-pytestmark = pytest.mark.usefixtures("drawn")
+drawn = pytest.mark.usefixtures("drawn")
 
 TEST = """
     from pytest_simbench.tasks import Moment
@@ -31,6 +49,7 @@ TEST = """
 """
 
 
+@drawn
 @pytest.mark.parametrize("workers", [(), ("-n2",)], ids=["one process", "xdist"])
 def test_results_tables_and_files(pytester: pytest.Pytester, workers: tuple[str, ...]) -> None:
     pytester.makepyfile(TEST)
@@ -67,6 +86,7 @@ class Noisy(wrong.Noisy):
 """
 
 
+@drawn
 def test_a_broken_claim_fails_the_test(
     pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,6 +105,7 @@ def test_a_broken_claim_fails_the_test(
     )
 
 
+@drawn
 def test_a_failing_example_shrinks_and_tells_how_to_replay(pytester: pytest.Pytester) -> None:
     """No health check is silenced, a crash is a failing example, the worker is reused, and the
     line that is printed replays the smallest example."""
@@ -117,3 +138,116 @@ def test_a_failing_example_shrinks_and_tells_how_to_replay(pytester: pytest.Pyte
     replayed = simbench(pytester, *command.split()[1:])
     assert replayed.ret == 0
     replayed.stdout.fnmatch_lines(["mujoco headless tuned, t = 0.200 s", "  a: 0.0000 0.0000 0.2*"])
+
+
+@dataclass(frozen=True)
+class Result:
+    """What was asked for, in place of what came of it."""
+
+    asked: Any
+    strict: bool = False
+    first: str = "the first run"
+
+    def to_wire(self) -> dict[str, Any]:
+        return {"sentence": f"{self.asked}, {self.strict}"}
+
+
+def world(tmp_path: Path, mode: str = "gui", **more: Any) -> tuple[Case, Any]:
+    """A case, and its episodes that nobody runs."""
+    case = Case("a.py::test_x[mujoco]", "mujoco", mode, "tuned", "a:B", tmp_path, seed=7, **more)
+    constructed = SimpleNamespace(settings={"timestep": 0.1}, versions={"numpy": "2"})
+    experiment = Experiment(case, Falling())
+    handle = SimpleNamespace(constructed=constructed)
+    return case, SimpleNamespace(experiment=experiment, handle=handle, task=Falling())
+
+
+def line(kind: Any, case: Case, result: Any) -> Line:
+    settings = {"timestep": 0.1, "task.duration": 0.6}
+    of = case.test, "mujoco", case.mode, "tuned", "falling", 7
+    return Line(kind, *of, settings, {"numpy": "2"}, result)
+
+
+@pytest.mark.parametrize(("protocol", "most"), [("fast", None), ("smoke", 5)])
+def test_what_perturb_asks_for_and_keeps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, protocol: str, most: int | None
+) -> None:
+    case, episodes = world(tmp_path, protocol=PROTOCOLS[protocol])
+    for module, name in ((search, "search"), (stability, "stability"), (stability, "sensitivity")):
+        monkeypatch.setattr(module, name, lambda of, *given, **more: Result((*given, more)))
+    monkeypatch.setattr(search, "to_wire", Result.to_wire)
+    perturber = Perturber(episodes, strict=True)
+    assert perturber.task == Falling()
+    every = [
+        perturber.search({"x": 0.1}, shrinks=3),
+        perturber.stability({"x": 0.1}, examples=20),
+        perturber.stability(),
+        perturber.stability(examples=2),
+        perturber.sensitivity("left", 3, moments=()),
+    ]
+    assert every == [
+        Result(({"x": 0.1}, {"shrinks": 3})),
+        Result(({"x": 0.1}, {"examples": most or 20}), strict=True),
+        Result((None, {"examples": most} if most else {}), strict=True),
+        Result((None, {"examples": 2}), strict=True),
+        Result((Perturbation("x", 3, "left"), {"moments": ()})),
+    ]
+    kinds = "search", *("stability",) * 3, "sensitivity"
+    kept = [json.loads(text) for text in (tmp_path / NAME).read_text().splitlines()]
+    assert kept == [
+        {"schema": 1, **vars(line(kind, case, result.to_wire()))}
+        for kind, result in zip(kinds, every, strict=True)
+    ]
+
+
+class Handle:
+    """In place of a simulator's."""
+
+    def __init__(self, case: Case) -> None:
+        self.case, self.closed = case, False
+        self.constructed = SimpleNamespace(settings={"timestep": 0.1}, versions={"numpy": "2"})
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.mark.parametrize(
+    ("mode", "display"), [("gui", True), ("headless", True), ("headless", False)]
+)
+def test_what_replay_asks_for_and_keeps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: str, display: bool
+) -> None:
+    case, episodes = world(
+        tmp_path, mode, function="a.py::test_x", variant="v",
+        own_timestep=0.002, changes={"timestep": 0.001},
+    )  # fmt: skip
+    displays = create_autospec(Displays, instance=True)
+    displays.environment.side_effect = None if display else DisplayError("there is no display")
+    saved: list[Any] = []
+    sample = Sample("", "", 0, (), {}, (), np.zeros((0, 1)))
+    monkeypatch.setattr(repeatability, "SimulatorHandle", Handle)
+    monkeypatch.setattr(
+        repeatability,
+        "Episodes",
+        lambda of, handle: SimpleNamespace(experiment=of, handle=handle, task=of.task),
+    )
+    monkeypatch.setattr(repeatability, "replay", lambda of, **more: Result({"of": of, **more}))
+    monkeypatch.setattr(Sample, "of", lambda *told: saved.append(told) or sample)
+    monkeypatch.setattr(Sample, "save", lambda *told: saved.append(told))
+    asked = repeatability.replayed(episodes.experiment, displays, 3, moments=()).asked
+    of, fresh, other = asked.pop("of"), asked.pop("fresh"), asked.pop("other_mode")
+    info = adapter("mujoco").info
+    assert asked == {"capabilities": info.capabilities, "jobs": 3, "moments": ()}
+    assert (of.handle.case, fresh.case, of.handle is fresh) == (case, case, False)
+    if mode == "gui":
+        assert other.case == replace(case, mode="headless", display=None)
+    elif display:
+        assert other.case == replace(case, mode="gui", display=displays)
+    else:
+        assert other == "there is no display"
+    assert all(one.closed for one in (of.handle, fresh, other) if one != "there is no display")
+    named = replace(sample, test="test_x, v, 1ms", parameters='{"task.duration": 0.6}')
+    assert saved.pop() == (named, tmp_path, "motions/test_x_mujoco-3e3e85c6d4.npz")
+    assert saved == [("the first run", f"mujoco {mode} tuned", "falling", 7)]
+    (kept,) = map(json.loads, (tmp_path / NAME).read_text().splitlines())
+    assert kept["kind"] == "replay"
+    assert repeatability._other_mode(case, (mode,), displays) == "mujoco has no window"

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import io
 import re
 import sys
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import Any
-from xml.etree import ElementTree
 
 import pytest
 
-from pytest_simbench.experiment.experiment import Experiment
-from pytest_simbench.records.record import Failure
+from pytest_simbench.client.display import Displays
 from pytest_simbench.report.files import write_outcome
 from pytest_simbench.report.model.outcome import begun
 from tests.approval import assert_approved
-from tests.made_up import MadeUp
+from tests.plugin.inner import wrapper
+from tests.plugin.whole import prepare, run
 
 TESTS = """
 import pytest
@@ -62,75 +58,10 @@ def test_needs(repeat):
     pass
 """
 
-PYTESTS = re.compile(
-    r"^[.Fxs]+(?=test_|$| +\[)( +\[100%\])?\n?|^[-=!]+ (gen|Keyb).*\n"
-    r"|(?<= in )[\d.]+s.*|^.*Keyb.*\n",
-    re.M,
-)
-"""What pytest itself says."""
-
-
-class Runs:
-    """A plugin: how many landed follows from the test and the repetition's number.
-
-    Attributes:
-        landed: share from the second repetition on.
-        cut: Ctrl-C comes in the repetition of this number of `test_claims`.
-    """
-
-    def __init__(self, landed: float, cut: int) -> None:
-        self.landed, self.cut = landed, cut
-
-    def pytest_sessionstart(self, session: pytest.Session) -> None:
-        ours: Any = session.config.pluginmanager.get_plugin("simbench-session")
-        ours.run.executor = MadeUp(1, self.end)
-
-    def end(self, experiment: Experiment, number: int) -> tuple[dict[str, Any], None]:
-        if number == self.cut:
-            raise KeyboardInterrupt
-        used = {"rss_mb": {"mean": 200.0 + number, "peak": 300.0}, "cpu_percent": {"mean": 50.0}}
-        found = {
-            "resources": used, "timeline": {"start": 1.0, "end": 1.0 + 0.1 * number},
-            "stepping": {"simulated": 0.6, "wall": 0.1 * number, "cpu": 0.1},
-        }  # fmt: skip
-        if "crash" in experiment.case.test and number == 2:
-            error = Failure("WorkerDied", "the worker died", "fall", "its last words")
-            return {**found, "status": "failed", "error": error}, None
-        landed = 1.0 if number == 1 else self.landed
-        return {**found, "status": "ok", "metrics": {"landed": landed}}, None
-
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("mujoco")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    monkeypatch.setenv("COLUMNS", "120")
-    monkeypatch.setenv("GITHUB_STEP_SUMMARY", "summary.md")
-    monkeypatch.delitem(sys.modules, "test_runs", raising=False)
-    for name in ("matplotlib", "trimesh"):  # nothing is drawn
-        monkeypatch.setitem(sys.modules, name, None)
-    Path("test_runs.py").write_text(TESTS)
-    Path("pytest.ini").write_text("[pytest]\nreps = 8\njunit_family = xunit1\n")
-
-
-def run(words: str, landed: float = 0.5, cut: int = 99) -> str:
-    """What was printed, the exit code, the badge, and JUnit's messages and properties."""
-    said = io.StringIO()
-    plain = "--sim=mujoco -q --tb=no -rN -n0 -p no:warnings --color=no --sim-badge=b.json"
-    with redirect_stdout(said), redirect_stderr(said):
-        code = pytest.main(
-            [*plain.split(), "--junitxml=j.xml", *words.split()], plugins=[Runs(landed, cut)]
-        )
-    told = [f"$ pytest {words}", PYTESTS.sub("", said.getvalue()), f"exit code {int(code)}"]
-    told += [Path("b.json").read_text()] if Path("b.json").exists() else []
-    for case in ElementTree.parse("j.xml").iter("testcase"):
-        properties = [f"{p.get('name')}={p.get('value')}" for p in case.iter("property")]
-        lost = [(e.get("message") or "").partition("\n")[0] for e in case if e.get("message")]
-        lost += [f"text: {e.text}" for e in case if "Failed: " in (e.get("message") or "")]
-        told += [f"{case.get('name')}: {', '.join([*lost, *properties])}"]
-    text = "\n".join([*told, ""]).replace(f"{Path.cwd()}/", "DIR/")
-    return re.sub(r"\n  (?=\S)", " ", text)  # where lines break the folder's length decides
+    prepare(tmp_path, monkeypatch, TESTS)
 
 
 def test_what_each_test_says() -> None:
@@ -166,6 +97,29 @@ def test_one_that_is_cut_and_completed_in_part_has_not_passed(killed: bool) -> N
     assert '"color": "brightgreen"' in run("--sim-resume=cut -k high")
 
 
+def test_one_whose_failed_test_is_mended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also one that repeats nothing."""
+    words, tests = (
+        "-k 'whole or high or none'",
+        f"{TESTS}\ndef test_none(sim_name): assert 1 == 2\n",
+    )
+    Path("test_runs.py").write_text(tests)
+    text = run(f"--sim-output=out {words}")
+    Path("test_runs.py").write_text(tests.replace("assert 1 == 2", "assert 2 == 2"))
+    monkeypatch.delitem(sys.modules, "test_runs")
+    text += run(f"--sim-resume=out {words}")
+    assert_approved("run-mended", text + run("--sim-resume=out -k high"))
+
+
+def test_who_tells_no_task_that_it_repeats_fails() -> None:
+    test = '@pytest.mark.parametrize("a", [3])\n@pytest.mark.repeats("a")\ndef test_it(repeat, a):'
+    Path("test_runs.py").write_text(
+        f"import pytest\nfrom tests.tiny import Falling\n{test} repeat(Falling())\n"
+    )
+    told = "test_it[mujoco-headless-3]: repeats needs the name of a parameter that holds a task; "
+    assert f"Failed: test_runs.py::{told}choose from a" in run("--sim-jobs=2")
+
+
 def test_one_whose_page_cannot_be_written() -> None:
     Path("out/report.html").mkdir(parents=True)
     assert_approved("run-unwritten", run("--sim-output=out -k low"))
@@ -176,8 +130,127 @@ def test_one_whose_page_cannot_be_written() -> None:
     [
         ("thresholds", "--sim-threshold=landed=0.6,nosuch=1 -k claims"),
         ("threshold", "--sim-threshold=landed=2 -k claims"),
+        ("stopped", "--sim-threshold=nosuch=1 -x -k 'no_crash or left'"),
         ("steps", "--sim-profile=default,tuned --sim-sweep=0.001,0.002 --reps=auto:12 -k low"),
     ],
 )
 def test_others(name: str, words: str) -> None:
     assert_approved(f"run-{name}", run(f"--sim-output=out {words}"))
+
+
+ASKED = """
+import pytest
+from pytest_simbench.records.repeatability import Line, append
+from pytest_simbench.tasks import Throwing
+from tests.tiny import Falling
+
+class TestOwn:
+    @pytest.fixture
+    def sim_settings(self):
+        return {"noslip_iterations": 3}
+
+    @pytest.mark.sim_timeout(50)
+    @pytest.mark.repeats("task")
+    @pytest.mark.reps(1)
+    @pytest.mark.parametrize("task", [Falling()], ids=["b"])
+    def test_own(self, repeat, task):
+        repeat(task)
+
+@pytest.mark.policies("")
+def test_files(repeat, policy, scene_file):
+    assert scene_file().free_bodies
+    assert policy is not None
+    repeat(Falling(0.2))
+
+def test_one_and_another(repeat):
+    repeat(Falling(0.3))
+    repeat(Falling(0.4))
+
+def test_one_end(output_path):
+    found = {"sentence": "5 mm in x change it"}
+    append(output_path, Line("search", "t", "ode", "headless", "tuned", "a", 1, {}, {}, found))
+
+def test_arm(repeat):
+    repeat(Throwing())
+
+def test_arm_alone(robot):
+    assert robot.name
+
+def test_arm_here(sim_case, robot):
+    assert sim_case.robot in ("", robot.name)
+
+class Rolling(Falling):
+    name, study_timeout = "rolling", 30  # no decimal point
+
+@pytest.mark.parametrize("task", [Falling(0.1), Rolling(0.7)])
+@pytest.mark.repeats("task")
+@pytest.mark.reps(1)
+def test_alone(repeat, task):
+    repeat(task)
+"""
+
+BOX = '<body pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1"/></body>'
+
+TYPED = (
+    "--sim-profile=tuned,own.toml --sim-set=mujoco.timestep=0.004 --sim-seed=3 "
+    "--sim-timeout=7 --sim-stall-timeout=9 --sim-memory-limit=500 --jitter=2 --sim-fresh "
+    "--sim-trace=off --protocol=paper --sim-jobs=2 --policies=mine.py:one,mine.py:two --gui "
+    "--sim-scene=scene.xml"
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("scene", "--sim-record=mcap --sim-scene=scene.xml -k step"),
+     ("typed", f"test_runs.py -k one {TYPED}"),
+     ("robots", "--robot=all --protocol=smoke --headless -k arm"),
+     ("build", "test_runs.py --sim=mujoco@mine=bin/python -k 'mine and alone'"),
+     ("plain", "test_runs.py --sim-video=retain-on-failure --sim-jobs=2")],
+)  # fmt: skip
+def test_how_repetitions_are_run(name: str, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the options, the ini file, the test's marks, settings and files say of them; and that
+    the same command finds none to be missing."""
+    pytest.importorskip("av", reason="videos need the extra 'video'")
+    monkeypatch.setattr(Displays, "environment", lambda self: {})
+    Path("test_runs.py").write_text(ASKED)
+    Path("mine.py").write_text("policies = {'one': lambda seen: None, 'two': lambda seen: None}")
+    wrapper(Path("bin/python"))
+    Path("own.toml").write_text('simulator = "mujoco"\n[settings]\nnoslip_iterations = 5\n')
+    Path("scene.xml").write_text(f"<mujoco><worldbody>{BOX}</worldbody></mujoco>")
+    text = run(f"--sim-output=out {words}")
+    size = Path("cases").stat().st_size
+    cases = re.sub(r"<.*? object at 0x\w+>", "OBJECT", Path("cases").read_text())
+    assert "exit code 0" in run(f"--sim-resume=out {words}")
+    assert Path("cases").stat().st_size == size
+    assert_approved(f"run-asked-{name}", text + cases.replace(f"{Path.cwd()}/", "DIR/"))
+
+
+FILES = """
+from tests.tiny import Falling
+
+def test_unknown(data_set):
+    data_set("nosuch")
+
+def test_missing(data_set):
+    data_set("cube_tosses")
+
+def test_none(scene_file):
+    scene_file()
+
+def test_end(repeat, scene_file):
+    scene = scene_file("scene.xml")
+    {}
+"""
+
+
+def test_files_that_cannot_be_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A scene, its starts or its log end the run; a data set concerns its test alone."""
+    Path("data").mkdir()
+    Path("scene.xml").write_text(f"<mujoco><worldbody>{BOX}</worldbody></mujoco>")
+    ends = ['scene_file("scene.xml", starts="keyframes")', 'scene_file.log("no.csv", scene)']
+    text = ""
+    for k, end in enumerate([*ends, 'scene_file("scene.xml", starts="no.npz")']):
+        Path("test_runs.py").write_text(FILES.format(end))
+        monkeypatch.delitem(sys.modules, "test_runs", raising=False)
+        text += run(f"--sim-data=data --sim-output=out{k}")
+    assert_approved("run-files", text)

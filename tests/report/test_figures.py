@@ -126,7 +126,8 @@ def of_steps() -> Iterator[Picture]:
 def of_ranks() -> Iterator[Picture]:
     success = np.array([[0, 0, 0, 0, 1], [0, 1, 1, 0, 1], [1, 1, 1, 1, 1]], dtype=float)
     one = compared(np.array([success, success[::-1], success[[0, 2, 1]]]))
-    return transfer.pictures([one, one])
+    alike = compared(np.array([success, success[[0, 2, 1]]]))
+    return transfer.pictures([one, one, alike])
 
 
 def of_a_search() -> Iterator[Picture]:

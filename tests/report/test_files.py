@@ -22,7 +22,14 @@ from pytest_simbench.records.folder import RunContents, RunFolder
 from pytest_simbench.records.metrics import Metric
 from pytest_simbench.records.record import Record
 from pytest_simbench.records.repeatability import Line, append
-from pytest_simbench.report.files import Written, columns_of, write_badge, write_files, write_tables
+from pytest_simbench.report.files import (
+    Written,
+    columns_of,
+    where,
+    write_badge,
+    write_files,
+    write_tables,
+)
 from pytest_simbench.report.markdown.github import LARGEST, VARIABLE, append_summary, badge
 from pytest_simbench.report.markdown.run import render_run
 from pytest_simbench.report.model.report import Report
@@ -181,6 +188,11 @@ def test_what_cannot_be_written_is_told(tmp_path: Path) -> None:
     assert not written.complete
     assert "report.md could not be written" in written.problems[0]
     assert (tmp_path / "run" / "report.csv").exists()
+
+
+def test_a_page_below_the_folder_is_told_in_short(tmp_path: Path) -> None:
+    assert where(tmp_path / "run" / "a.html", tmp_path) == "report: run/a.html"
+    assert where(tmp_path / "a.html", tmp_path / "run") == f"report: {tmp_path / 'a.html'}"
 
 
 FINE = [record(name, k) for name in ("a", "b") for k in range(10)]

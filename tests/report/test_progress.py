@@ -171,6 +171,12 @@ def test_a_log_of_a_long_repetition_shows_that_it_lives() -> None:
     desk.now += HEARTBEAT_SECONDS
     desk.progress.phase("wind up")
     assert desk.written[-1] == f"{TEST}  repetition 1 of 1  pick  9/15 cubes\n"
+    told = Desk(1, is_tty=False)
+    told.progress.repetition(1, seed=7)
+    for told.now in (0.0, HEARTBEAT_SECONDS - 0.5, HEARTBEAT_SECONDS):
+        assert told.written == []
+        told.progress.phase("pick")
+    assert len(told.written) == 1
 
 
 def test_failures_stay_in_sight() -> None:

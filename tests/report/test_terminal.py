@@ -6,13 +6,17 @@ import re
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.records.notes import Notes
 from pytest_simbench.records.record import Record
 from pytest_simbench.report.model import tables
-from pytest_simbench.report.model.document import Column
+from pytest_simbench.report.model.document import Column, Table
 from pytest_simbench.report.model.summary import TaskSummary, summarise
 from pytest_simbench.report.terminal.grid import render
+from pytest_simbench.report.terminal.parts import render_changes, render_tables
 from pytest_simbench.report.terminal.run import MOST_LINES, render_brief, render_run, render_task
 from pytest_simbench.scene.pair_friction import OF_PAIRS
 from tests.approval import assert_approved
@@ -158,6 +162,31 @@ def test_an_empty_run_prints_nothing() -> None:
     assert render_run([], 80) == render_brief([], 80) == ""
 
 
+def test_what_there_is_not_leaves_no_empty_lines() -> None:
+    table = Table("seeds", [Column("a", ["1", "2"])])
+    assert render_tables([table] * 2, 80).split("\n") == [
+        "seeds",
+        "-----",
+        "",
+        "a",
+        "-",
+        "1",
+        "2",
+        "",
+        "seeds",
+        "-----",
+        "",
+        "a",
+        "-",
+        "1",
+        "2",
+    ]
+    same = run_gate(stacking_run(), stacking_run(), (), METRICS)
+    shown = render_changes(same, 80, limited=False)
+    passed = "not significantly more repetitions crashed; no other limit was tested"
+    assert render_changes(same, 80, limited=True) == f"{shown}\n\n{passed}"
+
+
 def test_a_table_too_wide_is_cut_by_group_and_its_rows_named_again() -> None:
     columns = [
         Column("name", ["a", "b"], left=True),
@@ -181,3 +210,21 @@ def test_a_table_too_wide_below_its_names_is_told_apart_and_nothing_is_cut() -> 
         ["metric", "verdict"], ["placed", *verdict], ["hit", *verdict],
         ["b"], ["metric", "value"], ["hit", *value], ["metric", "verdict"], ["hit", *verdict],
     ]  # fmt: skip
+
+
+@given(
+    st.lists(st.lists(st.integers(1, 9), min_size=1, max_size=2), min_size=3, max_size=9),
+    st.integers(0, 30),
+)
+def test_numbers_are_whole_wherever_there_is_room_for_a_column(
+    found: list[list[int]], room: int
+) -> None:
+    """Cells of one or two lines, each line of a letter of its own."""
+    letters = iter("abcdefghijklmnopqrst")
+    cells = [[next(letters) * n for n in cell] for cell in found]
+    columns = [Column("long word", cells[k::3][: len(cells) // 3]) for k in range(3)]
+    lines = [[line for cell in column.cells for line in cell.lines] for column in columns]
+    label, *others = (max(4, *map(len, of)) for of in lines)
+    shown = render(columns, label + 2 + max(others) + room).splitlines()
+    assert max(map(len, shown)) <= label + 2 + max(others) + room
+    assert {line for of in lines for line in of} <= {*" ".join(shown).split()}

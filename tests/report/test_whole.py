@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from pytest_simbench.description.carried import Carried, keep
 from pytest_simbench.measure.gate import run_gate
 from pytest_simbench.measure.limits import parse_limits
 from pytest_simbench.measure.watching import Step
@@ -110,6 +111,11 @@ def scene(folder: RunFolder) -> RunOutcome:
         *(end(who, x, step=0.0005) for who, x in (("a", 0.0), ("b", 0.1))),
     ):
         folder.append(replace(one, stepping={"cpu": 0.1, "simulated": 2.5, "wall": 0.1}))
+    told = (
+        Carried("geom size", "carried", ""),
+        Carried("option wind", "not carried", "none", "all"),
+    )
+    keep(folder.path, Path("a.xml"), told)
     return RunOutcome(None)
 
 
@@ -185,7 +191,7 @@ def test_a_whole_report(
 
 def test_a_watch() -> None:
     steps = [
-        Step("mujoco", "3.3", "3.4", ("placed fell",), ("RAM rose", "it warns"), day="2026-11-01"),
+        Step("mujoco", "3.3", "3.4", ("placed fell",) * 9, ("RAM rose",) * 12, day="2026-11-01"),
         Step("drake", "1.40", "1.41", (), (), day="2026-11-02"),
     ]
     told = watched.section(steps, ["mujoco 3.4 changed something."])

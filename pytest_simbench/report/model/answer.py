@@ -62,7 +62,7 @@ def standing(name: str, summary: TaskSummary) -> Standing:
             else "open"
         )  # fmt: skip
     untold = ""
-    if not {"ahead", "behind", "apart"} & {*verdicts.values()}:
+    if not {"behind", "apart"} & {*verdicts.values()}:  # who is ahead has somebody behind
         same = f"the same within {100 * MARGIN:g} points"
         untold = _untold(found) if "open" in verdicts.values() else same
     return Standing(verdicts, untold)

@@ -152,6 +152,9 @@ def test_laws_that_no_step_helps_are_named() -> None:
     assert sweep.BROKEN == "laws that no step keeps with the error that 1 ms may cost"
     fine = sweep.details(swept([law("a", "fall", 0.0, step=h) for h in STEPS]))
     assert sweep.BROKEN not in [table.title for table in fine]
+    assert texts(fine[0].columns)["a"] == ["exact"]
+    one = [law("a", "fall", ratio, step=h) for ratio, h in ((None, 1e-3), (0.5, 2e-3))]
+    assert texts(sweep.details(swept(one))[0].columns)["a"] == ["-"]  # one error has no order
 
 
 def test_profiles_of_a_sweep_are_told_apart() -> None:

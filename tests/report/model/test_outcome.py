@@ -14,7 +14,7 @@ import pytest
 from pytest_simbench.measure.gate import GateReport, run_gate
 from pytest_simbench.measure.limits import Limit
 from pytest_simbench.report.files import write_outcome
-from pytest_simbench.report.model.outcome import NAME, RunOutcome, cut_at, looks_at
+from pytest_simbench.report.model.outcome import NAME, RunOutcome, begun, cut_at, looks_at
 from tests.report.samples import METRICS, record
 
 
@@ -42,6 +42,16 @@ def test_a_folder_without_one_says_nothing(tmp_path: Path) -> None:
     write_outcome(tmp_path, RunOutcome(True))
     assert RunOutcome.read(tmp_path) == (RunOutcome(True), "")
     assert RunOutcome(True).compared is None
+
+
+def test_one_that_has_begun_keeps_what_was_open_and_how_often_it_was_looked_at(
+    tmp_path: Path,
+) -> None:
+    assert begun(tmp_path, ["b", "a"]) == RunOutcome(looks=0, ended=False, open=("a", "b"))
+    write_outcome(tmp_path, RunOutcome(True, ("b", compared()), 3, cut=("c",), open=("d",)))
+    assert begun(tmp_path, ["a"]) == RunOutcome(
+        None, looks=3, cut=("c",), ended=False, open=("a", "d")
+    )
 
 
 def spoilt(**changes: Any) -> str:

@@ -134,11 +134,12 @@ def test_each_configuration_has_its_own_deviations_of_all_tasks() -> None:
 
 
 def test_the_command_runs_the_same_seed_again() -> None:
-    given = record(test="suites/test_x.py::test_x[a b-'c]", mode="gui", jitter=0.5)
+    robot = {"name": "ur5", "digest": "1"}
+    given = record(test="suites/test_x.py::test_x[a b-'c]", mode="gui", jitter=0.5, robot=robot)
     assert shlex.split(command(given)) == [
         "pytest", "suites/test_x.py::test_x[a b-'c]", "--sim-name=mujoco", "--sim-seed=1001",
         "--sim-reps=1", "--sim-profile=tuned", "--sim-protocol=fast", "--sim-jitter=0.5",
-        "--sim-gui",
+        "--sim-robot=ur5", "--sim-gui",
     ]  # fmt: skip
 
 
