@@ -199,11 +199,9 @@ class SimSession:
         node.workerinput["simbench_problem"] = run.problem
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_makereport(
-        self, item: pytest.Item, call: pytest.CallInfo[None]
-    ) -> Generator[None, Any, Any]:
+    def pytest_runtest_makereport(self, item: pytest.Item) -> Generator[None, Any, Any]:
         """Have a test's records travel with its report, to an xdist controller for instance; and of
-        one that failed what it was of. That one is not resumed says nothing of the run."""
+        one that failed what it was of."""
         report = yield
         if not self.begun:
             return report
@@ -213,11 +211,8 @@ class SimSession:
             item.stash[REPEATED].ends.add(report.outcome)
         report.simbench_told = dict(self.run.told)
         if report.failed and hasattr(item, "callspec") and "sim_case" in fixtures_of(item):
-            from pytest_simbench.experiment.resumed import NotResumed
             from pytest_simbench.plugin.marks import describe_failure
 
-            if call.excinfo and isinstance(call.excinfo.value.__context__, NotResumed):
-                return report
             report.simbench_failed = describe_failure(item, report, len(self.selection.profiles))
         return report
 
