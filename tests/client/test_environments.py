@@ -89,6 +89,7 @@ def test_what_makes_one(
     def run(command: list[str], variables: dict[str, str], look: Any) -> None:
         ran.append((" ".join(command), variables))
         folder.mkdir(exist_ok=True)
+        look()
 
     monkeypatch.setattr(environments, "uv", lambda: program)
     monkeypatch.setattr(environments, "_run", run)
@@ -103,7 +104,7 @@ def test_what_makes_one(
     assert {one.name: one.read_text() for one in folder.iterdir()} == {
         MARKER: '{"requirements": ["six==1.16.0"]}\n'
     }
-    assert told == ["\rsixth: 0 MB, 0 s \n"]
+    assert told == [*["\rsixth: 0 MB, 0 s "] * 2, "\rsixth: 0 MB, 0 s \n"]
 
 
 def test_two_that_make_the_same_wait_for_each_other(info: SimulatorInfo) -> None:

@@ -76,7 +76,7 @@ def test_joints_have_no_drives_and_the_dynamics_of_the_file(tmp_path: Path) -> N
     }  # fmt: skip
     assert prepared.velocity_limits == {"rail": FASTEST, "hinge": FASTEST}
     assert [len(link.shapes) for link in prepared.moving_links] == [1, 2]  # with its handle
-    assert scene.robot.gripper == Gripper((), 0.0, 0.0, 0.0)
+    assert (scene.robot.gripper, scene.robot.srdf) == (Gripper((), 0.0, 0.0, 0.0), "")
     assert (scene.name, scene.file) == ("cabinet", str(tmp_path / "cabinet.urdf"))
 
 

@@ -105,6 +105,14 @@ def test_more_crashes_than_may_fail_whatever_else_is_claimed(
     assert (metric.name, judgement.verdict) == ("crashed", "refuted")
 
 
+def test_that_none_crashed_stands_in_the_table_of_claims() -> None:
+    made = placed(*GOOD)
+    made.assert_no_crashes()
+    ((metric, found),) = made.judged
+    assert (metric, found.verdict, found.claim) == (CRASHED, "supported", at_most(0.0))
+    assert (found.interval.mean, found.interval.n) == (0.0, len(GOOD))
+
+
 def test_what_a_test_claims_of_crashes_itself_counts_but_none_must_finish_one() -> None:
     made = placed(*GOOD, also=1)
     made.assert_crashed_at_most(0.5)
