@@ -17,6 +17,8 @@ import psutil
 import pytest
 from execnet.gateway_io import popen_bootstrapline
 
+from pytest_simbench import __version__
+from pytest_simbench.client import process
 from pytest_simbench.client.connection import BOOTSTRAP, OPENED, Connection
 from pytest_simbench.client.errors import Where
 from pytest_simbench.client.launch import Launch
@@ -165,3 +167,15 @@ def test_a_popen_specification(case: Case) -> None:
     spec = f"popen//execmodel=main_thread_only//python={sys.executable}"
     record = performed(replace(case, spec=spec), Falling())
     assert record.resources["rss_mb"]["peak"] > 20
+
+
+def test_another_version_of_this_package_is_told(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(process, "__version__", "0.0")
+    kind, _, message = failure(case, Falling())
+    told = (
+        f"runs pytest-simbench {__version__}, this is 0.0; install the same version on both sides"
+    )
+    assert kind == "WorkerStartError"
+    assert told in message

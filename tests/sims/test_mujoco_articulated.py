@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -162,6 +163,16 @@ def test_limits_drives_and_the_rest_of_the_scene(kitchen: Path) -> None:
         assert hulls[link] == pytest.approx(size, abs=1e-3)
     assert scene.apart == (("link/arm", "link/hand"),)  # parent and child
     assert [body.name for body in scene.bodies] == ["cabinet", "ball"]
+
+
+def test_a_link_may_be_a_mesh(kitchen: Path) -> None:
+    corners = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3]])
+    mesh = f'<asset><mesh name="m" vertex="{" ".join(map(str, corners.flat))}"/></asset>'
+    text = KITCHEN.replace("<worldbody>", f"{mesh}<worldbody>")
+    scene = changed(kitchen, 'type="cylinder" size=".03 .1"', 'type="mesh" mesh="m"', text).scene
+    (found,) = description_xml(scene.robot).findall("link[@name='hand']/collision/geometry/mesh")
+    edges = pdist(np.unique(mesh_points(found.get("filename", "")).round(9), axis=0))
+    assert sorted(edges) == pytest.approx(sorted(pdist(corners)), abs=1e-6)
 
 
 def test_masks_between_links_and_the_rest_keep_them_apart(kitchen: Path) -> None:

@@ -200,6 +200,8 @@ def test_faults_of_a_robot_stand_in_two_worlds(name: str) -> None:
     faults = robot_faults(robot)
     quantities = [fault.quantity for fault in faults.values()]
     assert len(faults) == 19
+    words = {"passive_damping", "joint_friction", "spring", "link_gravity"}  # `Deviation.only`
+    assert {fault.word for fault in faults.values()} == {"", *words}
     assert [len(group) for group in rounds((), faults)] == [17, 2]
     joints = {quantity.split("/")[1] for quantity in quantities if quantity.startswith("joint/")}
     assert joints <= set(RobotModel(robot).robot.joint_names)
